@@ -1,0 +1,1 @@
+"""The detector: from phasors to evidence and verdicts."""

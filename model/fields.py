@@ -1,0 +1,178 @@
+"""Tables of a user's file, described field by field.
+
+One `Field` is the only place that knows a key's kind, unit, range and default: the
+checks (`table_check`), their messages and the tables of the documentation follow from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Literal
+
+__all__ = [
+    "Field",
+    "Kind",
+    "as_toml",
+    "bounds_of",
+    "describe_field",
+    "did_you_mean",
+    "markdown_table",
+]
+
+Kind = Literal[
+    "name", "text", "number", "integer", "flag", "impedance", "range", "numbers", "table", "tables"
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Field:
+    """One key of a table.
+
+    Parameters
+    ----------
+    name
+        The key.
+    kind
+        What its value must be:
+
+        - ``name``: printable text without a colon or space around it;
+        - ``text``: any text, or one of `choices`;
+        - ``number``: finite, an integer will do; ``integer``; ``flag``: true or false;
+        - ``impedance``: ``[r, x]`` or ``{ mag, deg }``, bounds are on the magnitude and
+          the resistance is never negative;
+        - ``range``: ``[low, high]``; ``numbers``: a list; bounds are on each number;
+        - ``table``, ``tables``: one table, an array of tables; not checked any deeper.
+    doc
+        One sentence for the documentation.
+    unit
+        Unit of the number, empty where it has none.
+    low, high
+        Bounds that the number may reach.
+    above
+        Lower bound that the number must exceed.
+    not_zero
+        The number must differ from 0.
+    choices
+        The only texts allowed, if any.
+    respell
+        Pairs ``(variant, standard)``, replaced inside a text before it is checked.
+    required
+        The key must be there.
+    default
+        Value of an absent key; None where absence itself means something.
+    same_as
+        An absent key takes the value of this other one, which stands before it.
+    """
+
+    name: str
+    kind: Kind
+    doc: str
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    above: float | None = None
+    not_zero: bool = False
+    choices: tuple[str, ...] = ()
+    respell: tuple[tuple[str, str], ...] = ()
+    required: bool = False
+    default: object = None
+    same_as: str = ""
+
+
+def did_you_mean(found: str, known: Iterable[str]) -> str:
+    """Return `` (did you mean ...?)`` with the nearest of the known names, or nothing.
+
+    Examples
+    --------
+    >>> did_you_mean("lenght_km", ["name", "length_km"])
+    " (did you mean 'length_km'?)"
+    """
+    near = get_close_matches(found, list(known), n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+_KIND_WORDS: dict[Kind, str] = {
+    "name": "a name",
+    "text": "text",
+    "number": "a finite number",
+    "integer": "an integer",
+    "flag": "true or false",
+    "impedance": "[r, x] or { mag = ..., deg = ... }",
+    "range": "[low, high]",
+    "numbers": "a list of finite numbers",
+    "table": "a table",
+    "tables": "an array of tables",
+}
+
+
+def bounds_of(field: Field) -> str:
+    """Return the range a number must lie in, such as ``-1 to 1, not 0``; may be empty."""
+    low, high = field.low, field.high
+    parts = []
+    if low is not None and high is not None:
+        parts.append(f"{low:g}" if low == high else f"{low:g} to {high:g}")
+    elif low is not None:
+        parts.append(f">= {low:g}")
+    if field.above is not None:
+        parts.append(f"> {field.above:g}")
+    if high is not None and low is None:
+        parts.append(f"<= {high:g}")
+    if field.not_zero:
+        parts.append("not 0")
+    return ", ".join(parts)
+
+
+def _choices(field: Field) -> str:
+    return " or ".join(repr(choice) for choice in field.choices)
+
+
+def describe_field(field: Field) -> str:
+    """Return what the field takes, such as ``a finite number, km, > 0``."""
+    if field.choices:
+        return _choices(field)
+    return ", ".join(filter(None, (_KIND_WORDS[field.kind], field.unit, bounds_of(field))))
+
+
+def as_toml(value: object) -> str:
+    """Return a parsed value much as the user wrote it, long ones cut short.
+
+    Examples
+    --------
+    >>> as_toml({"mag": 0.9, "deg": True})
+    '{ mag = 0.9, deg = true }'
+    """
+    text = _as_toml(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _as_toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (str, int, float)):
+        return repr(value)
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_as_toml(item) for item in value)}]"
+    if isinstance(value, Mapping):
+        inside = ", ".join(f"{key} = {_as_toml(item)}" for key, item in value.items())
+        return f"{{ {inside} }}" if inside else "{}"
+    return str(value)
+
+
+def markdown_table(fields: Sequence[Field]) -> str:
+    """Return the fields as the table that the documentation shows."""
+    head = ["field", "kind", "unit", "range", "default", "meaning"]
+    rows = [head, ["---"] * len(head), *(_markdown_row(field) for field in fields)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _markdown_row(field: Field) -> list[str]:
+    bounds = ", ".join(f"`{choice}`" for choice in field.choices) or bounds_of(field)
+    if field.required:
+        default = "required"
+    elif field.same_as:
+        default = f"as `{field.same_as}`"
+    else:
+        default = "–" if field.default is None else f"`{as_toml(field.default)}`"
+    return [f"`{field.name}`", field.kind, field.unit or "–", bounds or "–", default, field.doc]

@@ -1,0 +1,1 @@
+"""Choosing and certifying settings and places: arrays in, decisions out."""

@@ -1,0 +1,1 @@
+"""The people's door: one file per verb, and the command line."""

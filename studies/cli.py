@@ -1,0 +1,212 @@
+"""The command line: what may be typed, and which verb's module answers it.
+
+Nothing heavy is imported before a verb has been chosen, so that ``--help`` and a
+mistyped command answer at once.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from .. import __version__
+
+VERBS = {
+    "feeder": {
+        "check": "every fault of a feeder file at once, or a summary of its sections",
+        "solve": "one open phase: phasors before and after, and what each terminal says",
+    },
+    "study": {
+        "size": "the best settings of every section, with their certificate",
+    },
+}
+"""Group, verb, and what the verb does in a line: ``--help`` is printed from here."""
+
+ANSWERED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+_EXIT_CODES = """\
+exit codes:
+  0  answered
+  1  could not be done
+  2  the input is at fault
+  3  answered, but some section has no settings, or a certificate failed"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code.
+
+    Parameters
+    ----------
+    argv
+        The words after ``openphase``; those of this process by default.
+
+    Raises
+    ------
+    SystemExit
+        From argparse: 0 after ``--help`` and ``--version``, 2 for a wrong command line.
+    """
+    # The same bytes on any number of cores: how BLAS cuts a sum depends on its threads.
+    for library in ("OMP", "OPENBLAS", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    try:
+        try:
+            return _answer(build_parser().parse_args(argv))
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader (head, less) has left; keep the interpreter from complaining as it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+
+
+def _answer(args: argparse.Namespace) -> int:
+    """Hand the command to its verb, and turn what it raises into a message and a code."""
+    try:
+        from ..model.errors import InputError, OpenPhaseError
+
+        handler: Callable[[argparse.Namespace], int] = args.handler
+        try:
+            return handler(args)
+        except InputError as error:
+            print(error, file=sys.stderr)
+            return BAD_INPUT
+        except OpenPhaseError as error:
+            print(error, file=sys.stderr)
+            return FAILED
+    except KeyboardInterrupt:
+        resumes = "; the same command resumes" if args.resumes else ""
+        print(f"interrupted{resumes}", file=sys.stderr)
+        return INTERRUPTED
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Build the parser of the whole command line."""
+    parser = argparse.ArgumentParser(
+        prog="openphase",
+        usage="openphase VERB ...   (openphase VERB --help explains one verb)",
+        description="Size, prove and place open-phase detection on distribution feeders.",
+        epilog=f"{_verb_table()}\n\n{_EXIT_CODES}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"openphase {__version__}")
+    verbs = parser.add_subparsers(
+        dest="verb", metavar="VERB", required=True, prog="openphase", help=argparse.SUPPRESS
+    )
+    arguments = {"check": _check_arguments, "solve": _solve_arguments, "size": _size_arguments}
+    for group in VERBS.values():
+        for verb, summary in group.items():
+            verb_parser = verbs.add_parser(verb, description=summary, allow_abbrev=False)
+            verb_parser.set_defaults(resumes=False)
+            arguments[verb](verb_parser)
+    return parser
+
+
+def _verb_table() -> str:
+    rows = []
+    for group, verbs in VERBS.items():
+        rows.append(f"{group}:")
+        rows += [f"  {verb:<10} {summary}" for verb, summary in verbs.items()]
+    return "\n".join(rows)
+
+
+def _check_arguments(parser: argparse.ArgumentParser) -> None:
+    _add_feeder(parser)
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the feeder into FILE")
+    _add_json(parser)
+    parser.set_defaults(handler=_check)
+
+
+def _solve_arguments(parser: argparse.ArgumentParser) -> None:
+    _add_feeder(parser)
+    parser.add_argument(
+        "--open",
+        required=True,
+        metavar="LINE:FRACTION:PHASES",
+        help="what breaks, the fraction counted from the line's from-end: R2-R3:0.6:a",
+    )
+    parser.add_argument(
+        "--close",
+        action="append",
+        default=[],
+        metavar="SWITCH",
+        help="close a switch first (may be given several times)",
+    )
+    parser.add_argument(
+        "--settings",
+        type=Path,
+        metavar="SHEET.csv",
+        help="settings of the terminals (default: 1 A, 5 %%, 5 Ω, sign on)",
+    )
+    _add_json(parser)
+    parser.set_defaults(handler=_solve)
+
+
+def _size_arguments(parser: argparse.ArgumentParser) -> None:
+    _add_feeder(parser)
+    parser.add_argument(
+        "--study",
+        type=Path,
+        metavar="FILE",
+        help="what may happen on the feeder (default: the feeder's own study, if it ships)",
+    )
+    parser.add_argument(
+        "--scenarios",
+        type=_count_from(1),
+        metavar="N",
+        help="validation scenarios per class of events (default: what the target needs)",
+    )
+    parser.add_argument("--seed", type=_count_from(0), metavar="S", help="seed (default: 1)")
+    parser.add_argument(
+        "--jobs",
+        type=_count_from(1),
+        default=2,
+        metavar="J",
+        help="processes at work; never changes a number (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="the run folder (default: runs/<feeder>)"
+    )
+    parser.add_argument(
+        "--yes", action="store_true", help="do not stop at a study of more than ten minutes"
+    )
+    _add_json(parser)
+    parser.set_defaults(handler=_size, resumes=True)
+
+
+def _add_feeder(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("feeder", metavar="FEEDER", help="a feeder file, or a shipped name: paper")
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="answer with one JSON object")
+
+
+def _count_from(least: int) -> Callable[[str], int]:
+    """Return a parser of whole numbers that are at least ``least``."""
+
+    def parse(text: str) -> int:
+        if text.isdecimal() and int(text) >= least:
+            return int(text)
+        raise argparse.ArgumentTypeError(f"must be a whole number >= {least}, got {text!r}")
+
+    return parse
+
+
+def _check(args: argparse.Namespace) -> int:
+    from .checking import check_command
+
+    return check_command(args)
+
+
+def _solve(args: argparse.Namespace) -> int:
+    from .solving import solve_command
+
+    return solve_command(args)
+
+
+def _size(args: argparse.Namespace) -> int:
+    from .sizing import size_command
+
+    return size_command(args)

@@ -1,0 +1,1 @@
+"""Showing a study: plots, settings sheet, report."""
