@@ -15,7 +15,9 @@ YG_YG, D_YG, YG_D = 0, 1, 2  #: winding connections, HV first
 
 
 @compiled
-def bank(connection: int, zh: complex, zl: complex, y0: complex, y: Vector) -> tuple[Matrix, Matrix]:
+def bank(
+    connection: int, zh: complex, zl: complex, y0: complex, y: Vector
+) -> tuple[Matrix, Matrix]:
     """Shunt at the HV bus, and LV winding voltages per HV bus voltage.
 
     ``y0`` is the zero-sequence magnetizing admittance between the halves of a Yg/Yg unit.

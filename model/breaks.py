@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled
-from .matrix3 import IDENTITY, ZERO, load, store
+from .matrix3 import IDENTITY, ZERO, reciprocal, store
 
 __all__ = ["DEAD", "FLOATING", "open_phases", "open_series"]
 
@@ -31,41 +31,57 @@ SINGULAR = 1e-9  #: a driving-point admittance below this share of max|W| counts
 def open_phases(mask: int, here: Complex) -> int:
     """Open the phases in ``mask``; returns flags.
 
-    ``here`` (6, 3, 3) holds W, X, X', U, changed in place, and receives P and H: the
+    ``here`` (7, 3, 3) holds W, X, X', U, changed in place, and receives P and H: the
     voltage below the break is P V + H V_fork, V the voltage above it. A phase that is
-    connected to nothing or to no earth below gets zero volts and a flag.
+    connected to nothing or to no earth below gets zero volts and a flag. The last slot
+    is scratch.
     """
-    w, x, xt, u, p, h = here[0], here[1], here[2], here[3], here[4], here[5]
+    w, x, xt, u, p, h, row = here[0], here[1], here[2], here[3], here[4], here[5], here[6]
     store(here, 4, IDENTITY)
     store(here, 5, ZERO)
-    size = np.abs(w)
-    limit = SINGULAR * size.max()
-    row_w = np.zeros(3, np.complex128)
-    row_x = np.zeros(3, np.complex128)
+    largest = 0.0
+    for i in range(3):
+        for j in range(3):
+            largest = max(largest, squared(w[i, j]))
+    limit = SINGULAR**2 * largest
+    empty = 0
+    for i in range(3):
+        if max(squared(w[i, 0]), squared(w[i, 1]), squared(w[i, 2])) <= limit:
+            empty |= 1 << i
     flags = 0
     for a in range(3):
         if not mask & (1 << a):
             continue
-        row_w[:] = 0.0
-        row_x[:] = 0.0
-        if abs(w[a, a]) <= limit:
-            flags |= DEAD if size[a].max() <= limit else FLOATING
+        # V_a = row[0] V + row[1] V_fork
+        if squared(w[a, a]) <= limit:
+            flags |= DEAD if empty & (1 << a) else FLOATING
+            for j in range(3):
+                row[0, j] = row[1, j] = 0.0
         else:
-            row_w[:] = -w[a] / w[a, a]
-            row_x[:] = -x[a] / w[a, a]
-            row_w[a] = 0.0
+            scale = -reciprocal(w[a, a])
+            for j in range(3):
+                row[0, j] = scale * w[a, j]
+                row[1, j] = scale * x[a, j]
+            row[0, a] = 0.0
         for i in range(3):
             from_w, from_xt, from_p = w[i, a], xt[i, a], p[i, a]
-            w[i] += from_w * row_w
-            x[i] += from_w * row_x
-            xt[i] += from_xt * row_w
-            u[i] += from_xt * row_x
-            p[i] += from_p * row_w
-            h[i] += from_p * row_x
+            for j in range(3):
+                w[i, j] += from_w * row[0, j]
+                x[i, j] += from_w * row[1, j]
+                xt[i, j] += from_xt * row[0, j]
+                u[i, j] += from_xt * row[1, j]
+                p[i, j] += from_p * row[0, j]
+                h[i, j] += from_p * row[1, j]
             w[i, a] = xt[i, a] = p[i, a] = 0.0
-        w[a] = 0.0
-        x[a] = 0.0
+        for j in range(3):
+            w[a, j] = x[a, j] = 0.0
     return flags
+
+
+@compiled
+def squared(value: complex) -> float:
+    """``|value|**2``."""
+    return value.real * value.real + value.imag * value.imag
 
 
 @compiled
@@ -74,8 +90,10 @@ def open_series(mask: int, here: Complex) -> None:
     w = here[0]
     for a in range(3):
         if mask & (1 << a):
-            row = w[a] / w[a, a]
+            scale = reciprocal(w[a, a])
             for i in range(3):
-                w[i] -= w[i, a] * row
-                w[i, a] = 0.0
-            w[a] = 0.0
+                for j in range(3):
+                    if i != a and j != a:
+                        w[i, j] -= w[i, a] * w[a, j] * scale
+            for i in range(3):
+                w[i, a] = w[a, i] = 0.0

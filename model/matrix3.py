@@ -28,9 +28,7 @@ __all__ = [
     "times",
 ]
 
-Matrix = tuple[
-    complex, complex, complex, complex, complex, complex, complex, complex, complex
-]
+Matrix = tuple[complex, complex, complex, complex, complex, complex, complex, complex, complex]
 Vector = tuple[complex, complex, complex]
 Complex = NDArray[np.complex128]
 

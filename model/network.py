@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from .bank import D_YG, YG_D, YG_YG
 from .errors import InputError
-from .ladder import Tree
 from .parts import Feeder, Line, Load, Place, Transformer
+from .states import Tree
 from .symmetrical import phase_matrix
 
 __all__ = ["CONNECTIONS", "Network", "Piece", "compile_network", "locate"]
@@ -24,7 +24,7 @@ __all__ = ["CONNECTIONS", "Network", "Piece", "compile_network", "locate"]
 CONNECTIONS: dict[str, int] = {"Yg/Yg": YG_YG, "D/Yg": D_YG, "Yg/D": YG_D}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Piece:
     """A stretch of line between two nodes, or a closed switch (``line`` None)."""
 
@@ -34,6 +34,11 @@ class Piece:
     stop: float  #: and at the second
     length_km: float
     z_ohm: NDArray[np.complex128]  #: (3, 3)
+
+    @property
+    def key(self) -> tuple[str | None, tuple[str, str]]:
+        """What tells this piece from all others, in whichever state the network is."""
+        return self.line, self.ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -221,9 +226,7 @@ def _cut(line: Line, at: set[float]) -> list[Piece]:
     ]
 
 
-def _span(
-    feeder: Feeder, pieces: list[Piece]
-) -> tuple[list[str], dict[str, int], Piece | None]:
+def _span(feeder: Feeder, pieces: list[Piece]) -> tuple[list[str], dict[str, int], Piece | None]:
     """Node names in depth-first order, each node's piece to its parent, and the chord."""
     order, parent_piece, left = _walk(feeder.source.bus, pieces, set())
     if not left:
@@ -247,7 +250,7 @@ def _span(
                 feeder.name,
                 f"switches: the loop at bus '{fork}'",
                 "two switches",
-                "must leave the bus by a line on one side at least"
+                "must leave the bus by a line on one side at least",
             )
         order, parent_piece, _ = _walk(feeder.source.bus, pieces, {first})
         return order, parent_piece, pieces[first]

@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .ladder import Answer, Probes, State, Work, solve_block, workspace
+from .ladder import solve_block
 from .network import Network
+from .states import Answer, Probes, State, Work, workspace
 
 __all__ = ["FLOOR_PU", "all_probes", "new_answer", "solve", "steady_state"]
 
@@ -100,9 +101,7 @@ def solve(
     if work is None:
         work = workspace(len(network.nodes), len(network.units))
     answer.unit_v_pu[:] = 1.0 if start is None else start
-    solve_block(
-        network.tree, state, probes, work, answer, tolerance_pu, MOST_PASSES, FLOOR_PU
-    )
+    solve_block(network.tree, state, probes, work, answer, tolerance_pu, MOST_PASSES, FLOOR_PU)
     return answer
 
 

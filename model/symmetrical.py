@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["A", "FORTESCUE", "phase_matrix", "to_phases", "to_sequences"]
+__all__ = ["FORTESCUE", "A", "phase_matrix", "to_phases", "to_sequences"]
 
 A = np.exp(2j * np.pi / 3)  #: the operator a
 

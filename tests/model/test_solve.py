@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracles.dense import DenseSolution, Event, solve_dense
+from oracles.random_feeders import random_event, random_feeder
+
 from openphase.model.breaks import DEAD, FLOATING
-from openphase.model.ladder import NOT_CONVERGED, Answer, State
 from openphase.model.network import CONNECTIONS, Network, compile_network, locate
 from openphase.model.parts import Feeder
 from openphase.model.solve import solve, steady_state
-from oracles.dense import DenseSolution, Event, solve_dense
-from oracles.random_feeders import random_event, random_feeder
+from openphase.model.states import NOT_CONVERGED, Answer, State
 
 TOLERANCE = 1e-9
 
@@ -97,7 +98,10 @@ def solve_both(
 def test_random_feeders_agree_with_the_dense_solution(seed: int, exponent: float | None) -> None:
     rng = np.random.default_rng([seed, 17])
     feeder = random_feeder(
-        rng, int(rng.integers(1, 9)), with_tie=seed % 2 == 0, exponent=exponent,
+        rng,
+        int(rng.integers(1, 9)),
+        with_tie=seed % 2 == 0,
+        exponent=exponent,
         closed_switch=seed % 3 == 0,
     )
     closed = {s.name for s in feeder.switches if s.closed}
@@ -123,7 +127,10 @@ def test_loops_breaks_and_connections_all_occur_in_the_sample() -> None:
     for seed in range(120):
         rng = np.random.default_rng([seed, 17])
         feeder = random_feeder(
-            rng, int(rng.integers(1, 9)), with_tie=seed % 2 == 0, exponent=2.0,
+            rng,
+            int(rng.integers(1, 9)),
+            with_tie=seed % 2 == 0,
+            exponent=2.0,
             closed_switch=seed % 3 == 0,
         )
         event = random_event(rng, feeder, exponent=2.0)

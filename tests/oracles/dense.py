@@ -478,7 +478,7 @@ def _start_pu(circuit: _Circuit, start: DenseSolution | None) -> Floats:
     return np.concatenate([*values, np.empty(0)])
 
 
-def solve_dense(  # noqa: PLR0917
+def solve_dense(
     feeder: Feeder,
     closed: frozenset[str],
     event: Event | None = None,

@@ -111,7 +111,10 @@ def test_a_verb_s_code_is_the_exit_code(code, monkeypatch):
 @pytest.mark.parametrize(
     ("error", "code"),
     [
-        (InputError("feeder.toml: line 'R2-R3': length_km must be > 0, got -5.0"), 2),
+        (
+            InputError.single("feeder.toml", "lines 'R2-R3': length_km", "-5.0", "must be > 0"),
+            2,
+        ),
         (OpenPhaseError("runs/paper: the disk is full"), 1),
     ],
 )

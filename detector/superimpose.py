@@ -1,0 +1,25 @@
+"""Positive sequence, and superimposed quantities: now minus the window ΔT earlier, (1)-(2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["positive_sequence", "superimposed"]
+
+Complex = NDArray[np.complex128]
+
+A = np.exp(2j * np.pi / 3)
+
+
+def positive_sequence(abc: Complex) -> Complex:
+    """Positive-sequence component of phases a, b, c on the axis before the last.
+
+    Shape (..., 3, S) becomes (..., S).
+    """
+    return np.asarray(abc[..., 0, :] + A * abc[..., 1, :] + A.conjugate() * abc[..., 2, :]) / 3.0
+
+
+def superimposed(now: Complex, earlier: Complex) -> Complex:
+    """Equations (1)-(2): the change of a phasor over ΔT."""
+    return np.asarray(now - earlier)

@@ -1,0 +1,158 @@
+"""Where the measuring points stand in a compiled network, and what each terminal looks at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .network import Network, compile_network
+from .parts import Feeder, Point, Section
+from .states import Probes
+from .topology import edges, forest, tree_path
+
+__all__ = ["Points", "Terminal", "find_points", "into_line", "point_probes"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Terminal:
+    """A directed pair of measuring points: ``local`` looks at ``remote``.
+
+    Indices count the feeder's points; masks run over the network's edges.
+    """
+
+    local: str
+    remote: str
+    local_point: int
+    remote_point: int
+    into: float  #: +1 where the local current, positive into its line, flows into the section
+    on_path: NDArray[np.bool_]  #: edges of the section's path: a break there is internal
+    in_section: NDArray[np.bool_]  #: the path, and laterals that tee off it before the next point
+    load_side: bool  #: with the section cut, no path to the source is left behind the terminal
+    line_z1_ohm: complex
+
+    @property
+    def name(self) -> str:
+        """The terminal as reports print it."""
+        return f"{self.local}→{self.remote}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Points:
+    """The measuring points of a feeder in a compiled network, and the directed terminals."""
+
+    names: tuple[str, ...]
+    node: NDArray[np.int64]  #: (P,) where V is measured
+    edge: NDArray[np.int64]  #: (P,) the line's edge at that end, where I is measured
+    below: NDArray[np.bool_]  #: (P,) the point stands at the edge's lower end
+    terminals: tuple[Terminal, ...]  #: both directions of every section, in the file's order
+
+
+def point_probes(points: Points) -> Probes:
+    """What the solver must look at: V and I of every point."""
+    return Probes(v_node=points.node, i_edge=points.edge, i_below=points.below)
+
+
+def into_line(points: Points) -> NDArray[np.float64]:
+    """(P,) factor that makes a probed current positive into the point's line."""
+    return np.where(points.below, -1.0, 1.0)
+
+
+def find_points(feeder: Feeder, network: Network) -> Points:
+    """Place the feeder's points and sections in ``network``."""
+    edge, below = zip(*(_end(network, p) for p in feeder.points), strict=True)
+    terminals = []
+    for section in feeder.sections:
+        terminals += _terminals(feeder, network, section)
+    return Points(
+        names=tuple(p.name for p in feeder.points),
+        node=np.array([network.node(p.bus) for p in feeder.points], np.int64),
+        edge=np.array(edge, np.int64),
+        below=np.array(below, np.bool_),
+        terminals=tuple(terminals),
+    )
+
+
+def _end(network: Network, point: Point) -> tuple[int, bool]:
+    """The edge at the point's end of its line, and whether the point is at its lower end."""
+    pieces = network.edges_of(point.line)
+    first = network.pieces[pieces[0]]
+    at_from = first is not None and first.ends[0] == point.bus
+    edge = pieces[0] if at_from else pieces[-1]
+    return edge, bool(network.upward[edge] != at_from)
+
+
+def _terminals(feeder: Feeder, network: Network, section: Section) -> list[Terminal]:
+    """Both terminals of a section."""
+    points = {p.name: n for n, p in enumerate(feeder.points)}
+    ends = [feeder.points[points[name]] for name in (section.local, section.remote)]
+    # the path is that of the normal state, whatever is switched in this network
+    tree = forest(edges(feeder), [feeder.source.bus])[0]
+    _, path = tree_path(tree, ends[0].bus, ends[1].bus)
+    lines = {edge.name for edge in path if edge.is_line}
+    on_path = _edges_of_lines(network, lines)
+    in_section = on_path | _laterals(feeder, network, lines, ends)
+    z1 = sum((li.z1_ohm_per_km * li.length_km for li in feeder.lines if li.name in lines), start=0j)
+    return [
+        Terminal(
+            local=here.name,
+            remote=there.name,
+            local_point=points[here.name],
+            remote_point=points[there.name],
+            into=1.0 if here.line in lines else -1.0,
+            on_path=on_path,
+            in_section=in_section,
+            load_side=not _reaches_source(network, network.node(here.bus), in_section),
+            line_z1_ohm=z1,
+        )
+        for here, there in (ends, ends[::-1])
+    ]
+
+
+def _edges_of_lines(network: Network, lines: set[str]) -> NDArray[np.bool_]:
+    return np.array([p is not None and p.line in lines for p in network.pieces], np.bool_)
+
+
+def _laterals(
+    feeder: Feeder, network: Network, lines: set[str], ends: list[Point]
+) -> NDArray[np.bool_]:
+    """Edges that tee off the path between the two points, up to the next point."""
+    normal = [p for p in compile_network(feeder).pieces if p is not None]
+    edge_of = {p.key: k for k, p in enumerate(network.pieces) if p is not None}
+    guarded = {(p.bus, p.line) for p in feeder.points}
+    # the bus of an end lies inside unless its point stands on the section's own side of it
+    outer = {p.bus for p in ends if p.line in lines} | {feeder.source.bus}
+    waiting = sorted({n for p in normal if p.line in lines for n in p.ends} - outer)
+    seen = set(waiting) | outer
+    found = np.zeros(len(network.pieces), np.bool_)
+    while waiting:
+        name = waiting.pop()
+        for piece in normal:
+            if name not in piece.ends or piece.line in lines or (name, piece.line) in guarded:
+                continue
+            if piece.key in edge_of:
+                found[edge_of[piece.key]] = True
+            far = piece.ends[0] if piece.ends[1] == name else piece.ends[1]
+            if far not in seen and (far, piece.line) not in guarded:
+                seen.add(far)
+                waiting.append(far)
+    return found
+
+
+def _reaches_source(network: Network, node: int, cut: NDArray[np.bool_]) -> bool:
+    """Whether ``node`` is joined to the source bus without the edges in ``cut``."""
+    joined: list[tuple[int, int]] = [
+        (int(network.tree.parent[k]), k) for k in range(1, len(network.nodes)) if not cut[k]
+    ]
+    if network.has_chord and not cut[len(network.nodes)]:
+        joined.append((network.tree.fork, network.tree.tail))
+    reached = {0}
+    grown = True
+    while grown:
+        grown = False
+        for a, b in joined:
+            if (a in reached) != (b in reached):
+                reached |= {a, b}
+                grown = True
+    return node in reached

@@ -1,0 +1,62 @@
+"""Blocks on several processes: the same blocks, in the same order, whoever computes them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
+
+from joblib import Parallel, delayed
+from tqdm import tqdm
+
+from .draw import BlockId
+from .store import RunFolder
+
+__all__ = ["block_name", "run_blocks"]
+
+T = TypeVar("T")
+
+
+def block_name(which: BlockId) -> str:
+    """A block's name in the run folder."""
+    purpose, drawn = which.purpose.name.lower(), which.drawn.name.lower()
+    return f"{purpose}-{which.attempt}-{drawn}-{which.block:05d}"
+
+
+def run_blocks(
+    compute: Callable[[BlockId], T],
+    kind: type[T],
+    wanted: Sequence[BlockId],
+    folder: RunFolder,
+    jobs: int,
+    title: str,
+) -> Iterator[tuple[BlockId, T]]:
+    """Yield every wanted block in order: from the folder where it is there, else computed.
+
+    Computed blocks are stored as they come, so that an interrupted run resumes.
+    """
+    stored = {path.stem for path in folder.blocks.glob("*.npz")}
+    missing = [which for which in wanted if block_name(which) not in stored]
+    with tqdm(total=len(wanted), desc=title, unit="block", file=sys.stderr, mininterval=0.5) as bar:
+        bar.update(len(wanted) - len(missing))
+        computed = _compute(compute, missing, jobs)
+        for which in wanted:
+            result = None
+            if block_name(which) in stored:
+                result = folder.block(block_name(which), kind)
+                if result is None:  # a damaged file: computed again here
+                    result = compute(which)
+                    folder.keep_block(block_name(which), result)
+            else:
+                result = next(computed)
+                folder.keep_block(block_name(which), result)
+                bar.update(1)
+            yield which, result
+
+
+def _compute(compute: Callable[[BlockId], T], missing: Sequence[BlockId], jobs: int) -> Iterator[T]:
+    if jobs == 1:
+        yield from (compute(which) for which in missing)
+        return
+    parallel = Parallel(n_jobs=jobs, return_as="generator", pre_dispatch="4 * n_jobs")
+    yield from parallel(delayed(compute)(which) for which in missing)

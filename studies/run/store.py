@@ -1,0 +1,145 @@
+"""The run folder: blocks and results, each written whole or not at all.
+
+A manifest names what the run was made from. The same command finds its blocks again; a
+changed input starts afresh and says so.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import typing
+import zipfile
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.errors import OpenPhaseError
+
+__all__ = ["RunFolder", "as_json", "pack", "unpack", "write_whole"]
+
+T = TypeVar("T")
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that it is there complete, or not at all.
+
+    Raises OpenPhaseError where the folder cannot be written or the disk is full.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(content)
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise OpenPhaseError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def as_json(value: object) -> str:
+    """JSON as the project writes it: indented, keys in the given order, a final newline."""
+    return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def pack(value: Any, name: str = "") -> dict[str, NDArray[Any]]:
+    """Flatten a dataclass of arrays, tuples and dataclasses into named arrays."""
+    if is_dataclass(value):
+        parts = [(field.name, getattr(value, field.name)) for field in fields(value)]
+    elif isinstance(value, tuple):
+        parts = [(str(n), item) for n, item in enumerate(value)]
+    else:
+        return {name: np.asarray(value)}
+    flat: dict[str, NDArray[Any]] = {}
+    for key, item in parts:
+        flat |= pack(item, f"{name}.{key}" if name else key)
+    return flat
+
+
+def unpack(kind: type[T], flat: dict[str, NDArray[Any]], name: str = "") -> T:
+    """Rebuild what ``pack`` flattened, from the dataclass's annotations."""
+    hints = typing.get_type_hints(kind)
+    values: dict[str, Any] = {}
+    for field in fields(kind):  # type: ignore[arg-type]
+        hint, key = hints[field.name], f"{name}.{field.name}" if name else field.name
+        if typing.get_origin(hint) is tuple:
+            item = typing.get_args(hint)[0]
+            values[field.name] = tuple(
+                unpack(item, flat, f"{key}.{n}") for n in range(_length(flat, key))
+            )
+        else:
+            values[field.name] = flat[key]
+    return kind(**values)
+
+
+def _length(flat: dict[str, NDArray[Any]], name: str) -> int:
+    heads = {key[len(name) + 1 :].split(".", 1)[0] for key in flat if key.startswith(name + ".")}
+    return len(heads)
+
+
+class RunFolder:
+    """A study's folder on disk."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.blocks = path / "blocks"
+
+    def open(self, manifest: dict[str, object]) -> str | None:
+        """Prepare the folder for a run with these inputs; returns what to tell the user.
+
+        A folder whose manifest differs is emptied of what openphase put there.
+        """
+        text = as_json(manifest)
+        known = self.path / "manifest.json"
+        said = None
+        try:
+            if known.exists():
+                if known.read_text(encoding="utf-8") == text:
+                    blocks = len(list(self.blocks.glob("*.npz")))
+                    return f"{self.path}: resuming, {blocks} blocks are there" if blocks else None
+                said = f"{self.path}: inputs have changed since the last run; starting afresh"
+                self._empty()
+            elif self.path.exists() and any(self.path.iterdir()):
+                raise OpenPhaseError(
+                    f"{self.path}: holds files but no run of openphase; choose another --out"
+                )
+        except OSError as error:
+            raise OpenPhaseError(f"{self.path}: {error.strerror or error}") from error
+        self.write("manifest.json", text)
+        return said
+
+    def _empty(self) -> None:
+        for file in self.blocks.glob("*.npz*"):
+            file.unlink()
+        for pattern in ("*.json", "*.toml", "*.csv", "*.html", "*.png", "*.svg", "*.part"):
+            for file in self.path.glob(pattern):
+                file.unlink()
+
+    def write(self, name: str, content: str | bytes) -> Path:
+        """Write one file of the run."""
+        path = self.path / name
+        write_whole(path, content.encode("utf-8") if isinstance(content, str) else content)
+        return path
+
+    def log(self, line: str) -> None:
+        """Append a line to log.txt."""
+        with (self.path / "log.txt").open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
+    def block(self, name: str, kind: type[T]) -> T | None:
+        """A block that is there already, else None; a damaged one counts as not there."""
+        path = self.blocks / f"{name}.npz"
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                return unpack(kind, {key: file[key] for key in file.files})
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+            return None
+
+    def keep_block(self, name: str, value: object) -> None:
+        """Store a block."""
+        buffer = io.BytesIO()
+        np.savez(buffer, **pack(value))  # type: ignore[arg-type]
+        write_whole(self.blocks / f"{name}.npz", buffer.getvalue())

@@ -1,0 +1,271 @@
+"""``openphase size``: settings for every section of a feeder, with what they are worth."""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import hashlib
+import math
+import platform
+import sys
+import time
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..detector.criteria import Settings
+from ..model.errors import InputError, OpenPhaseError
+from ..model.feeder_file import dump_feeder, load_feeder
+from ..model.parts import Feeder
+from ..optimise.certificate import needed_trials, share_of_alpha
+from .run.blocks import run_blocks
+from .run.certify import Validation, add_up, compared_rows, judged, section_row
+from .run.choose import Training, as_settings, choices, gather, more_blocks, planned_blocks
+from .run.classes import DrawClass, Purpose
+from .run.draw import BlockId, Case, make_case
+from .run.engine import BLOCK
+from .run.ledger import attempt_number
+from .run.spec import Study, check_study, default_study, dump_study, read_study
+from .run.store import RunFolder, as_json
+from .run.tally import Tested, Trained, device_grid, judge_block, train_block
+from .show.report import write_report
+from .show.sheet import settings_csv, sheet_table
+
+__all__ = ["Sizing", "size_command", "size_feeder"]
+
+LONG_RUN_S = 600  #: longer runs ask for --yes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Demand:
+    """What is asked of a sizing run, beside feeder and study."""
+
+    seed: int = 1
+    scenarios: int | None = None
+    jobs: int = 2
+    yes: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sizing:
+    """A finished sizing: the result as it is printed, and what the report draws."""
+
+    result: dict[str, Any]
+    case: Case
+    training: Training
+    validation: Validation
+
+
+def say(text: str) -> None:
+    """A message to the user; stdout carries the answer only."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def size_command(args: argparse.Namespace) -> int:
+    """Run the verb; returns the exit code."""
+    feeder = load_feeder(args.feeder)
+    study = read_study(args.study) if args.study else default_study(feeder.name)
+    check_study(study, feeder, str(args.study or "study.toml"))
+    if not feeder.sections:
+        raise InputError.single(feeder.name, "sections", "none", "must name at least one section")
+    out = args.out or Path("runs") / feeder.name
+    demand = Demand(
+        seed=1 if args.seed is None else args.seed,
+        scenarios=args.scenarios,
+        jobs=args.jobs,
+        yes=args.yes,
+    )
+    sizing = size_feeder(feeder, study, demand, out)
+    if args.json:
+        print(as_json(sizing.result), end="")
+    else:
+        print(sheet_table(sizing.result))
+        print(f"\nResults: {out} (report.html, settings.csv, result.json)")
+    return exit_code(sizing.result)
+
+
+def exit_code(result: dict[str, Any]) -> int:
+    """0, or 3 where a section is left without a usable terminal or any is not certified."""
+    rows = result["sections"]
+    if any(row["status"] == "not_certified" for row in rows):
+        return 3
+    usable = {
+        frozenset((row["local"], row["remote"])) for row in rows if row["status"] in ("set", "weak")
+    }
+    return 0 if usable == {frozenset((row["local"], row["remote"])) for row in rows} else 3
+
+
+def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizing:
+    """Train, choose, validate once, and write the run folder."""
+    started = time.perf_counter()
+    case = make_case(feeder, study)
+    content = digest(dump_feeder(feeder), dump_study(study))
+    # the default number of scenarios depends on the attempt, which it also names: first try n = 1st
+    wanted = demand.scenarios or _default_scenarios(case, 1)
+    attempt = attempt_number(out.parent / "ledger.json", content, demand.seed, wanted)
+    scenarios = demand.scenarios or _default_scenarios(case, attempt)
+    folder = RunFolder(out)
+    folder_says = folder.open(_manifest(feeder, study, demand, scenarios, attempt))
+    if folder_says:
+        say(folder_says)
+    folder.write("study.toml", dump_study(study))
+    train = planned_blocks(case, Purpose.TRAIN, demand.seed, attempt, scenarios)
+    _announce(case, train, scenarios, attempt, demand)
+    folder.log(f"size {feeder.name}, seed {demand.seed}, attempt {attempt}, n {scenarios}")
+
+    training = _train(case, train, folder, demand.jobs, scenarios)
+    trained = time.perf_counter()
+    grid = device_grid(case)
+    chosen = choices(case, grid, training)
+    reference = study.reference
+    paper = Settings(
+        i_set_a=reference.i_set_a,
+        v_set_pu=reference.v_set_pct / 100.0,
+        z_set_ohm=reference.z_set_ohm,
+        negative_sign=study.detector.negative_sign,
+    )
+    settings = tuple(
+        (
+            *(as_settings(case, choice) for choice in own),
+            None if terminal.load_side else paper,
+        )
+        for own, terminal in zip(chosen, case.points.terminals, strict=True)
+    )
+    picked = time.perf_counter()
+    test = planned_blocks(case, Purpose.VALIDATE, demand.seed, attempt, scenarios)
+    validation = _validate(case, test, settings, folder, demand.jobs, scenarios)
+    validated = time.perf_counter()
+
+    sections, compared = [], []
+    for t, terminal in enumerate(case.points.terminals):
+        sections.append(section_row(case, t, chosen[t][0], validation, training.front[t], attempt))
+        if not terminal.load_side:
+            compared += compared_rows(case, t, settings[t], validation, attempt)
+    names = ("dead", "floating", "not_converged")
+    result = {
+        "version": __version__,
+        "seed": demand.seed,
+        "feeder": feeder.name,
+        "study_hash": digest(dump_study(study)),
+        "confidence": study.certificate.confidence,
+        "attempt": attempt,
+        "scenarios": scenarios,
+        "sections": sections,
+        "compared": compared,
+        "feeder_false_trips": {
+            "per_year_upper": None,
+            "assumptions": "not built yet: event classes have no rates per year",
+        },
+        "numerics": dict(zip(names, validation.flags.tolist(), strict=True)),
+    }
+    sizing = Sizing(result=result, case=case, training=training, validation=validation)
+    folder.write("result.json", as_json(result))
+    folder.write("settings.csv", settings_csv(result))
+    write_report(sizing.result, case, training.front, validation, folder)
+    timing = {
+        "train_s": trained - started,
+        "choose_s": picked - trained,
+        "validate_s": validated - picked,
+        "report_s": time.perf_counter() - validated,
+    }
+    folder.write("timing.json", as_json({key: round(s, 3) for key, s in timing.items()}))
+    return sizing
+
+
+def _train(
+    case: Case, blocks: list[BlockId], folder: RunFolder, jobs: int, scenarios: int
+) -> Training:
+    compute = functools.partial(train_block, case)
+    run = functools.partial(
+        run_blocks, compute, Trained, folder=folder, jobs=jobs, title="training"
+    )
+    training = gather(block for _, block in run(wanted=blocks))
+    while extra := more_blocks(case, blocks, training.trials, scenarios):
+        blocks += extra
+        training = gather(block for _, block in run(wanted=blocks))
+    return training
+
+
+def _validate(
+    case: Case,
+    blocks: list[BlockId],
+    settings: tuple[tuple[Settings | None, ...], ...],
+    folder: RunFolder,
+    jobs: int,
+    scenarios: int,
+) -> Validation:
+    compute = functools.partial(judge_block, case, settings=settings)
+    run = functools.partial(
+        run_blocks, compute, Tested, folder=folder, jobs=jobs, title="validation"
+    )
+    validation = add_up(run(wanted=blocks), BLOCK)
+    while extra := more_blocks(case, blocks, validation.trials, scenarios):
+        blocks += extra
+        validation = add_up(run(wanted=blocks), BLOCK)
+    return validation
+
+
+def _default_scenarios(case: Case, attempt: int) -> int:
+    """What the target needs at zero false trips."""
+    demand = case.study.certificate
+    alpha = share_of_alpha(demand.confidence, attempt, judged(case.points.terminals))
+    return needed_trials(demand.target, alpha)
+
+
+def _announce(
+    case: Case, train: list[BlockId], scenarios: int, attempt: int, demand: Demand
+) -> None:
+    """Say how much there is to do and how long it takes; ask for --yes where that is long."""
+    say(
+        f"{case.feeder.name}: {len(case.points.terminals)} terminals, "
+        f"{judged(case.points.terminals)} to judge; {scenarios:,} scenarios per class and side "
+        f"at least, attempt {attempt}; compiling the solver at first use …"
+    )
+    first = BlockId(
+        seed=demand.seed,
+        purpose=Purpose.TRAIN,
+        attempt=attempt,
+        drawn=DrawClass.OPEN_PHASE,
+        block=0,
+    )
+    train_block(case, first, 10)
+    begun = time.perf_counter()
+    train_block(case, first, 500)
+    each = (time.perf_counter() - begun) / 500
+    total = 2 * len(train) * BLOCK
+    seconds = total * each / demand.jobs
+    say(f"{total:,} scenarios in all, about {_span(seconds)} on {demand.jobs} processes")
+    if seconds > LONG_RUN_S and not demand.yes:
+        raise OpenPhaseError(
+            f"this takes about {_span(seconds)}: add --yes to start it, or --scenarios for fewer"
+        )
+
+
+def _span(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{math.ceil(seconds / 60)} min"
+
+
+def digest(*texts: str) -> str:
+    """SHA-256 of texts."""
+    return hashlib.sha256("\0".join(texts).encode("utf-8")).hexdigest()
+
+
+def _manifest(
+    feeder: Feeder, study: Study, demand: Demand, scenarios: int, attempt: int
+) -> dict[str, object]:
+    """What the run was made from; resuming needs the same."""
+    libraries = ("numpy", "scipy", "numba")
+    return {
+        "command": ["size", feeder.name, "--seed", demand.seed, "--scenarios", scenarios],
+        "openphase": __version__,
+        "python": platform.python_version(),
+        "libraries": {name: metadata.version(name) for name in libraries},
+        "feeder_sha256": digest(dump_feeder(feeder)),
+        "study_sha256": digest(dump_study(study)),
+        "seed": demand.seed,
+        "scenarios": scenarios,
+        "attempt": attempt,
+        "block": BLOCK,
+    }
