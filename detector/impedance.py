@@ -9,6 +9,8 @@ __all__ = ["connection_impedance"]
 
 Complex = NDArray[np.complex128]
 
+ROUNDING = 1e-11  #: a difference below this share of its terms is rounding, not physics
+
 
 def connection_impedance(
     v_local: Complex,
@@ -27,12 +29,13 @@ def connection_impedance(
     z_ohm : complex array
         Z_LR; 0 where it is undefined.
     undefined : bool array
-        Where the denominator is zero: the local current change is just what the local
-        voltage change explains, so that the impedance is 0/0 or unbounded.
+        Where the denominator vanishes, but for rounding: the local current change is just
+        what the local voltage change explains, so that the impedance is 0/0 or unbounded.
     """
     numerator = dv_local * v_remote - dv_remote * v_local
-    denominator = di_local * v_local - dv_local * i_local
-    undefined = denominator == 0
+    explained = dv_local * i_local
+    denominator = di_local * v_local - explained
+    undefined = np.asarray(np.abs(denominator) <= ROUNDING * np.abs(explained))
     if undefined.any():
         denominator[undefined] = 1.0
         numerator[undefined] = 0.0

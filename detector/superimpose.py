@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["positive_sequence", "superimposed"]
+__all__ = ["compensated", "positive_sequence", "superimposed"]
 
 Complex = NDArray[np.complex128]
 
@@ -23,3 +23,13 @@ def positive_sequence(abc: Complex) -> Complex:
 def superimposed(now: Complex, earlier: Complex) -> Complex:
     """Equations (1)-(2): the change of a phasor over ΔT."""
     return np.asarray(now - earlier)
+
+
+def compensated(now: Complex, earlier: Complex, v_now: Complex, v_earlier: Complex) -> Complex:
+    """X* = X' - X V'/V: the part of a change that the local voltage change does not explain.
+
+    Where ``v_earlier`` is zero there is nothing to compensate with: the plain change.
+    """
+    dead = v_earlier == 0
+    ratio = np.where(dead, 1.0, v_now) / np.where(dead, 1.0, v_earlier)
+    return np.asarray(now - earlier * ratio)

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from .compiled import compiled
 from .matrix3 import IDENTITY, ZERO, reciprocal, store
 
-__all__ = ["DEAD", "FLOATING", "open_phases", "open_series"]
+__all__ = ["DEAD", "FLOATING", "UNDEFINED", "open_phases", "open_series"]
 
 Complex = NDArray[np.complex128]
 
 DEAD = 1  #: an opened conductor's far side is connected to nothing, or to no source
 FLOATING = 2  #: an opened conductor's far side has equipment, but no way to earth
+UNDEFINED = 8  #: times 2^a: phase a has no voltage of its own beyond the break
 
 SINGULAR = 1e-9  #: a driving-point admittance below this share of max|W| counts as zero
 
@@ -54,6 +55,7 @@ def open_phases(mask: int, here: Complex) -> int:
             continue
         # V_a = row[0] V + row[1] V_fork
         if squared(w[a, a]) <= limit:
+            flags |= UNDEFINED << a
             flags |= DEAD if empty & (1 << a) else FLOATING
             for j in range(3):
                 row[0, j] = row[1, j] = 0.0

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Front", "front_of", "margins", "merge_fronts", "nearest"]
+__all__ = ["Front", "border", "front_of", "margins", "merge_fronts", "nearest"]
 
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -86,6 +86,44 @@ def merge_fronts(parts: list[Front]) -> Front:
         np.concatenate([p.reach_ohm for p in parts]) if parts else np.empty(0),
         np.concatenate([p.scenario for p in parts]) if parts else np.empty((0, 3), np.int64),
     )
+
+
+def border(front: Front, v_set_pu: float, margin: float = 1.0) -> tuple[Real, Real]:
+    """Border of the settings (I_set, Z_set) that trip at one V_set, as the corners of its steps.
+
+    A setting trips in some event exactly where it lies on or below this line. With
+    ``margin`` it is the border of the settings that do not keep that margin: of those that
+    an event trips once it is magnified by it, in |ΔV1| as well.
+
+    Returns
+    -------
+    i_set_a, z_set_ohm : (2n + 1,) arrays
+        From I_set = 0 at the longest reach, step by step down to Z_set = 0; empty where no
+        event trips at this V_set.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> front = front_of(
+    ...     np.array([1.0, 4.0, 9.0]),
+    ...     np.array([0.01, 0.01, 0.05]),
+    ...     np.array([30.0, 20.0, 10.0]),
+    ...     np.zeros((3, 3), np.int64),
+    ... )
+    >>> i_set_a, z_set_ohm = border(front, 0.02)
+    >>> i_set_a.tolist(), z_set_ohm.tolist()
+    ([0.0, 1.0, 1.0, 4.0, 4.0], [30.0, 30.0, 20.0, 20.0, 0.0])
+    """
+    able = front.dv1_pu / margin <= v_set_pu
+    i, z = front.di1_a[able] * margin, front.reach_ohm[able] * margin
+    order = np.lexsort((z, i))[::-1]
+    i, z = i[order], z[order]
+    # from the largest current down, a step is where the reach exceeds all before it
+    step = np.diff(np.maximum.accumulate(z), prepend=0.0) > 0
+    i, z = i[step][::-1], z[step][::-1]
+    if not i.size:
+        return i, z
+    return np.append(0.0, np.repeat(i, 2)), np.append(np.repeat(z, 2), 0.0)
 
 
 def factors(front: Front, i_set_a: Real, v_set_pu: Real, z_set_ohm: Real) -> Real:

@@ -46,38 +46,27 @@ class Validation:
     samples: tuple[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]], ...]  #: for pictures
 
 
+#: what simply adds up over blocks
+ADDED = ("trials", "effective", "trips", "reachable", "found", "missed", "profile", "flags")
+
 SAMPLED_BLOCKS = 25  #: blocks of a class whose kept evidence goes into pictures
 
 
 def add_up(blocks: Iterable[tuple[BlockId, Tested]], size: int) -> Validation:
-    """Add blocks of ``size`` scenarios."""
+    """Add blocks of ``size`` scenarios; memory does not grow with their number."""
     total: dict[str, Any] = {}
-    fronts: list[tuple[Front, ...]] = []
+    front: tuple[Front, ...] = ()
     samples: list[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]]] = []
     count = 0
     for which, block in blocks:
         count += size
-        for name in (
-            "trials",
-            "effective",
-            "trips",
-            "reachable",
-            "found",
-            "missed",
-            "profile",
-            "flags",
-        ):
+        for name in ADDED:
             total[name] = total.get(name, 0) + getattr(block, name)
-        fronts.append(block.front)
+        pairs = zip(front, block.front, strict=True) if front else ()
+        front = tuple(merge_fronts(list(pair)) for pair in pairs) or block.front
         if which.block < SAMPLED_BLOCKS:
             samples.append((which, block.sample, block.sample_side))
-    terminals = range(len(fronts[0]))
-    return Validation(
-        front=tuple(merge_fronts([front[t] for front in fronts]) for t in terminals),
-        scenarios=count,
-        samples=tuple(samples),
-        **total,
-    )
+    return Validation(front=front, scenarios=count, samples=tuple(samples), **total)
 
 
 def judged(terminals: tuple[Terminal, ...]) -> int:

@@ -1,0 +1,291 @@
+"""``openphase solve``: one break, the phasors before and after, and what each terminal says."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..detector.criteria import Reason, Settings, verdict
+from ..detector.evidence import Phasors, evidence_of
+from ..detector.impedance import connection_impedance
+from ..detector.superimpose import compensated, positive_sequence
+from ..model.breaks import FLOATING, UNDEFINED
+from ..model.errors import InputError, OpenPhaseError, Report
+from ..model.feeder_file import load_feeder
+from ..model.fields import did_you_mean
+from ..model.network import Network, compile_network, locate
+from ..model.parts import Feeder
+from ..model.points import Points, find_points, into_line
+from ..model.solve import all_probes, solve, steady_state
+from ..model.states import NOT_CONVERGED, Answer
+from .run.store import as_json
+from .settings_file import read_settings
+
+__all__ = ["Break", "parse_break", "solve_break", "solve_command"]
+
+Complex = NDArray[np.complex128]
+
+#: without a sheet, every terminal has the paper's settings
+DEFAULTS = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0)
+
+PHASES = "abc"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Break:
+    """A broken conductor: ``fraction`` from the line's from-end, ``phases`` 0, 1, 2."""
+
+    line: str
+    fraction: float
+    phases: tuple[int, ...]
+
+
+def solve_command(args: argparse.Namespace) -> int:
+    """Run the verb; returns the exit code."""
+    feeder = load_feeder(args.feeder)
+    broken = parse_break(args.open, feeder)
+    closed = _closed(args.close, feeder)
+    settings = read_settings(args.settings, feeder) if args.settings else None
+    print("solving; the solver is compiled at first use …", file=sys.stderr, flush=True)
+    answer = solve_break(feeder, broken, closed, settings)
+    print(as_json(answer) if args.json else _table(feeder, broken, answer), end="")
+    return 0
+
+
+def parse_break(text: str, feeder: Feeder) -> Break:
+    """Read ``LINE:FRACTION:PHASES``, such as ``R2-R3:0.6:a``; all faults at once."""
+    report = Report(source="--open", document={})
+    parts = text.rsplit(":", 2)
+    if len(parts) != 3:
+        raise InputError.single("--open", "", text, "must read LINE:FRACTION:PHASES")
+    line, fraction_text, phases = parts
+    names = [item.name for item in feeder.lines]
+    if line not in names:
+        report.add(("line",), f"must be a line of '{feeder.name}'{did_you_mean(line, names)}", line)
+    try:
+        fraction = float(fraction_text)
+    except ValueError:
+        fraction = float("nan")
+    if not 0.0 <= fraction <= 1.0:
+        report.add(("fraction",), "must be a number in 0..1", fraction_text)
+    letters = phases.lower()
+    if not letters or len(set(letters)) != len(letters) or set(letters) - set(PHASES):
+        report.add(("phases",), "must be one, two or three of a, b, c", phases)
+    report.raise_if_any()
+    return Break(
+        line=line, fraction=fraction, phases=tuple(sorted(PHASES.index(x) for x in letters))
+    )
+
+
+def _closed(names: list[str], feeder: Feeder) -> frozenset[str]:
+    """Switches that are closed: normally, or named by the user."""
+    known = [switch.name for switch in feeder.switches]
+    report = Report(source="--close", document={})
+    for name in names:
+        if name not in known:
+            report.add((name,), f"must be a switch of '{feeder.name}'{did_you_mean(name, known)}")
+    report.raise_if_any()
+    return frozenset(s.name for s in feeder.switches if s.closed) | frozenset(names)
+
+
+def solve_break(
+    feeder: Feeder,
+    broken: Break,
+    closed: frozenset[str],
+    settings: dict[tuple[str, str], Settings | None] | None = None,
+) -> dict[str, Any]:
+    """Phasors before and after the break and each terminal's view, without any noise.
+
+    Returns what ``solve --json`` prints: volts to earth and amperes positive into the
+    line, complex numbers as [re, im], null where a conductor floats.
+    """
+    network = compile_network(feeder, closed)
+    edge, share = locate(network, broken.line, broken.fraction)
+    intact = steady_state(network)._replace(edge=np.array([edge]), share=np.array([share]))
+    opened = intact._replace(open_mask=np.array([sum(1 << a for a in broken.phases)]))
+    before = solve(network, intact)
+    after = solve(network, opened, start=before.unit_v_pu)
+    if (before.flags[0] | after.flags[0]) & NOT_CONVERGED:
+        raise OpenPhaseError(f"{feeder.name}: voltage-dependent loads did not settle")
+    lost = _lost_phases(broken, int(after.flags[0]))
+    dark = _below(network, edge)
+    buses = {}
+    for name in sorted(_bus_names(feeder), key=network.nodes.index):
+        node = network.node(name)
+        buses[name] = {
+            "before": _pairs(before.v[node, :, 0]),
+            "after": _pairs(after.v[node, :, 0], lost if dark[node] else ()),
+        }
+    upper, lower = _stub_names(feeder, network, edge, broken)
+    for n, name in ((0, upper), (1, lower)):
+        buses[name] = {
+            "before": _pairs(before.stub[n, :, 0]),
+            "after": _pairs(after.stub[n, :, 0], lost if n else ()),
+        }
+    lines = {
+        line.name: {
+            "before": _line_currents(network, before, line.name),
+            "after": _line_currents(network, after, line.name),
+        }
+        for line in feeder.lines
+    }
+    return {
+        "buses": buses,
+        "lines": lines,
+        "sections": _sections(feeder, network, (before, after), settings),
+    }
+
+
+def _bus_names(feeder: Feeder) -> set[str]:
+    ends = {end for line in feeder.lines for end in (line.from_bus, line.to_bus)}
+    return ends | {end for s in feeder.switches for end in (s.from_bus, s.to_bus)}
+
+
+def _lost_phases(broken: Break, flags: int) -> tuple[int, ...]:
+    """Opened phases that have no voltage of their own beyond the break."""
+    if flags & FLOATING and len(broken.phases) == 3:
+        return broken.phases
+    return tuple(a for a in broken.phases if flags & (UNDEFINED << a))
+
+
+def _below(network: Network, edge: int) -> NDArray[np.bool_]:
+    """Nodes that hang below ``edge``."""
+    below = np.zeros(len(network.nodes), np.bool_)
+    if edge < below.size:
+        below[edge] = True
+        for k in range(edge + 1, below.size):
+            below[k] = below[network.tree.parent[k]]
+    return below
+
+
+def _stub_names(feeder: Feeder, network: Network, edge: int, broken: Break) -> tuple[str, str]:
+    """Names of the solver's upper and lower stub: p is the upstream one in the normal state."""
+    normal = compile_network(feeder)
+    usual, _ = locate(normal, broken.line, broken.fraction)
+    p, q = f"{broken.line}.p", f"{broken.line}.q"
+    return (p, q) if normal.upward[usual] == network.upward[edge] else (q, p)
+
+
+def _pair(value: complex) -> list[float]:
+    return [float(value.real), float(value.imag)]
+
+
+def _pairs(abc: Complex, lost: tuple[int, ...] = ()) -> list[list[float] | None]:
+    return [None if phase in lost else _pair(value) for phase, value in enumerate(abc)]
+
+
+def _line_currents(network: Network, answer: Answer, line: str) -> dict[str, Any]:
+    """Amperes into a line at both ends."""
+    edges = network.edges_of(line)
+    first, last = edges[0], edges[-1]
+    # probes: edge k's upper end at 2k, its lower end at 2k + 1, both positive downwards
+    start = answer.i[2 * first + (0 if network.upward[first] else 1), :, 0]
+    stop = answer.i[2 * last + (1 if network.upward[last] else 0), :, 0]
+    return {
+        "from_end": _pairs(start if network.upward[first] else -start),
+        "to_end": _pairs(-stop if network.upward[last] else stop),
+    }
+
+
+def _phasors(network: Network, points: Points, frames: tuple[Answer, Answer]) -> Phasors:
+    """What perfect instruments at the points report."""
+    probe = all_probes(network)
+    place = [
+        int(np.flatnonzero((probe.i_edge == k) & (probe.i_below == low))[0])
+        for k, low in zip(points.edge, points.below, strict=True)
+    ]
+    into = into_line(points)[:, None, None]
+    return Phasors(
+        v=np.stack([frame.v[points.node] for frame in frames]),
+        i=np.stack([frame.i[place] * into for frame in frames]),
+    )
+
+
+def _sections(
+    feeder: Feeder,
+    network: Network,
+    frames: tuple[Answer, Answer],
+    settings: dict[tuple[str, str], Settings | None] | None,
+) -> list[dict[str, Any]]:
+    """Each terminal's evidence, verdict and reason."""
+    if not feeder.sections:
+        return []
+    points = find_points(feeder, network)
+    phasors = _phasors(network, points, frames)
+    v1, i1 = positive_sequence(phasors.v), positive_sequence(phasors.i)
+    star = compensated(i1[1], i1[0], v1[1], v1[0])
+    rows = []
+    for terminal in points.terminals:
+        seen = evidence_of(phasors, (terminal,), network.tree.v_nominal_v)
+        m, n, into = terminal.local_point, terminal.remote_point, terminal.into
+        z_abc, undefined = connection_impedance(
+            phasors.v[1, m],
+            phasors.v[1, n],
+            into * phasors.i[1, m],
+            phasors.v[1, m] - phasors.v[0, m],
+            phasors.v[1, n] - phasors.v[0, n],
+            into * (phasors.i[1, m] - phasors.i[0, m]),
+        )
+        own = DEFAULTS if settings is None else settings.get((terminal.local, terminal.remote))
+        reason = None if own is None else Reason(int(verdict(seen, own)[0, 0]))
+        rows.append(
+            {
+                "local": terminal.local,
+                "remote": terminal.remote,
+                "di1_a": float(seen.di1_a[0, 0]),
+                "di1_star_a": float(np.abs(star[m, 0])),
+                "dv1_pu": float(seen.dv1_pu[0, 0]),
+                "z1_ohm": None if seen.undefined[0, 0] else _pair(seen.z1_ohm[0, 0]),
+                "zabc_ohm": [
+                    None if undefined[a, 0] else _pair(z_abc[a, 0]) for a in range(len(PHASES))
+                ],
+                "trip": reason == Reason.TRIP,
+                "reason": reason.text if reason is not None else "no setting in the sheet",
+            }
+        )
+    return rows
+
+
+def _table(feeder: Feeder, broken: Break, answer: dict[str, Any]) -> str:
+    """The answer for people, in 100 columns."""
+    phases = "".join(PHASES[a] for a in broken.phases)
+    v_nominal = feeder.source.v_phase_v
+    lines = [
+        f"{feeder.name}: phase {phases} open at {broken.fraction:g} of {broken.line}",
+        "",
+        f"{'bus':<12}{'|V| before, % of nominal':^30}{'|V| after, %':^30}{'|change|, %':^24}",
+    ]
+    for name, bus in answer["buses"].items():
+        change = [
+            None if b is None or a is None else [a[0] - b[0], a[1] - b[1]]
+            for b, a in zip(bus["before"], bus["after"], strict=True)
+        ]
+        columns = [_sizes(part, 100 / v_nominal) for part in (bus["before"], bus["after"], change)]
+        lines.append(f"{name:<12}{columns[0]:^30}{columns[1]:^30}{columns[2]:^24}")
+    lines += [
+        "",
+        f"{'terminal':<12}{'|ΔI1| A':>9}{'|ΔI1*| A':>10}{'|ΔV1| %':>9}{'Z1 Ω':>18}   verdict",
+    ]
+    for row in answer["sections"]:
+        lines.append(
+            f"{row['local'] + '→' + row['remote']:<12}{row['di1_a']:>9.4f}{row['di1_star_a']:>10.4f}"
+            f"{row['dv1_pu'] * 100:>9.3f}{_polar(row['z1_ohm']):>18}   {row['reason']}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _sizes(values: list[list[float] | None], scale: float) -> str:
+    texts = ["floats" if v is None else f"{abs(complex(*v)) * scale:.3f}" for v in values]
+    return " ".join(f"{text:>8}" for text in texts)
+
+
+def _polar(value: list[float] | None) -> str:
+    if value is None:
+        return "undefined"
+    z = complex(*value)
+    return f"{abs(z):.4f}∠{np.degrees(np.angle(z)):.1f}°"
