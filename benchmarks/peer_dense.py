@@ -10,7 +10,7 @@ from problem import Complex, Problem, volts
 __all__ = ["dense"]
 
 CHUNK = 256
-TO_EARTH_S = 1e-12  #: holds what a break leaves connected to nothing
+TO_EARTH_S = 1e-14  #: holds what a break leaves connected to nothing
 
 
 def dense(problem: Problem) -> Callable[[], tuple[Complex, Complex]]:

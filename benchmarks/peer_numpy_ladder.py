@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from problem import Complex, Problem, volts
+from problem import Complex, Problem, shunts_of, volts
+
+from openphase.model.states import State
 
 __all__ = ["numpy_ladder"]
 
@@ -50,18 +52,18 @@ def numpy_ladder(problem: Problem) -> Callable[[], tuple[Complex, Complex]]:
 
 def _block(problem: Problem, n: int, part: slice, own: Buffers) -> None:
     tree = problem.network.tree
-    state, shunts = problem.parts[n]
-    _admittances(tree.unit_node, shunts[..., part], own)
+    state = problem.parts[n][0]
+    _admittances(tree.unit_node, shunts_of(problem.network, state.load_scale[:, part]), own)
     edge = np.where(state.open_mask[part] != 0, state.edge[part], -1)
     broken = [
         slice(*np.searchsorted(edge, (k, k + 1))) if (edge == k).any() else None
         for k in range(tree.parent.size)
     ]
     for k in range(tree.parent.size - 1, -1, -1):
-        _up(own, tree.z_ohm[k], own.y[k], own.f[k], own.w[k])
+        _up(own, tree.z_ohm[k, ..., None], own.y[k], own.f[k], own.w[k])
         here = broken[k]
         if here is not None:
-            _break(own, k, here, tree.z_ohm[k], state, part)
+            _break(own, k, here, tree.z_ohm[k, ..., None], state, part)
         if k:
             own.y[tree.parent[k]] += own.w[k]
     above = volts(problem.network)[:, None] * state.emf_pu[part]
@@ -82,7 +84,7 @@ def _up(own: Buffers, z: Complex, y: Complex, f: Complex, w: Complex) -> None:
     """F = (I + Z Y)^-1 and W = Y F into ``f`` and ``w``."""
     span = slice(0, y.shape[-1])
     m, t = own.a[..., span], own.one[0, 0, span]
-    _product(z[..., None], y, m, t)
+    _product(z, y, m, t)
     for i in range(3):
         m[i, i] += 1.0
     _inverse(m, f, t, own.two[0, 0, span])
@@ -123,35 +125,21 @@ def _inverse(m: Complex, out: Complex, t: Complex, d: Complex) -> None:
     out *= d
 
 
-def _break(
-    own: Buffers, k: int, here: slice, z: Complex, state: object, part: slice
-) -> None:
+def _break(own: Buffers, k: int, here: slice, z: Complex, state: State, part: slice) -> None:
     """Eliminate edge k again where it is broken: below the break, the break, above it."""
-    share = state.share[part][here]  # type: ignore[attr-defined]
-    mask = state.open_mask[part][here]  # type: ignore[attr-defined]
+    share = state.share[part][here]
+    mask = state.open_mask[part][here]
     size = share.size
     low, p, w = own.low[..., :size], own.p[..., :size], own.w[k][..., here]
     y, below = own.b[..., :size], own.c[..., :size]
-    z = z[..., None]
-    own_f = own.f[k][..., here]
-    _up_each(own, z * (1.0 - share), own.y[k][..., here], low, y)
+    _up(own, z * (1.0 - share), own.y[k][..., here], low, y)
     _open(y, mask, p)
-    _up_each(own, z * share, y, below, w)
+    _up(own, z * share, y, below, w)
     # V = low P (above the break), and above the break V = below V_parent
     t = own.one[0, 0, :size]
     middle = own.a[..., :size]
     _product(p, below, middle, t)
-    _product(low, middle, own_f, t)
-
-
-def _up_each(own: Buffers, z: Complex, y: Complex, f: Complex, w: Complex) -> None:
-    size = y.shape[-1]
-    m, t = own.a[..., :size], own.one[0, 0, :size]
-    _product(z, y, m, t)
-    for i in range(3):
-        m[i, i] += 1.0
-    _inverse(m, f, t, own.two[0, 0, :size])
-    _product(y, f, w, t)
+    _product(low, middle, own.f[k][..., here], t)
 
 
 def _open(w: Complex, mask: np.ndarray, p: Complex) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from openphase.model import load_feeder
 from openphase.model.bank import D_YG, YG_D
 from openphase.model.network import Network
@@ -21,7 +22,7 @@ from openphase.studies.run.classes import DrawClass, Purpose
 from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case
 from openphase.studies.run.spec import Study, default_study
 
-__all__ = ["Complex", "Problem", "draw_problem", "first", "paper_case", "volts"]
+__all__ = ["Complex", "Problem", "draw_problem", "first", "paper_case", "shunts_of", "volts"]
 
 Complex = NDArray[np.complex128]
 Int = NDArray[np.int64]
@@ -76,7 +77,10 @@ def draw_problem(size: int) -> Problem:
         probes=point_probes(case.points),
         before=before,
         after=after,
-        shunt_s=(_shunts(case.network, before), _shunts(case.network, after)),
+        shunt_s=(
+            shunts_of(case.network, before.load_scale),
+            shunts_of(case.network, after.load_scale),
+        ),
         v=(answers[0].v, answers[1].v),
         sound=answers[1].flags == 0,
     )
@@ -100,11 +104,11 @@ def _pick(state: State, chosen: Int) -> State:
     return State(*(np.ascontiguousarray(values[..., chosen]) for values in state))
 
 
-def _shunts(network: Network, state: State) -> Complex:
+def shunts_of(network: Network, load_scale: NDArray[np.float64]) -> Complex:
     """(U, 2, S): every unit with its load as admittances of sequence 0, and of 1 and 2."""
     tree = network.tree
-    load_s = np.zeros((len(network.units), state.emf_pu.size), np.complex128)
-    np.add.at(load_s, tree.load_unit, tree.load_y_s[:, None] * state.load_scale)
+    load_s = np.zeros((len(network.units), load_scale.shape[1]), np.complex128)
+    np.add.at(load_s, tree.load_unit, tree.load_y_s[:, None] * load_scale)
     out = np.empty((load_s.shape[0], 2, load_s.shape[1]), np.complex128)
     for unit, y in enumerate(load_s):
         zh, zl, y0 = tree.unit_zh_ohm[unit], tree.unit_zl_ohm[unit], tree.unit_y0_s[unit]

@@ -17,7 +17,7 @@ def positive_sequence(abc: Complex) -> Complex:
 
     Shape (..., 3, S) becomes (..., S).
     """
-    return np.asarray(abc[..., 0, :] + A * abc[..., 1, :] + A.conjugate() * abc[..., 2, :]) / 3.0
+    return np.asarray((abc[..., 0, :] + A * abc[..., 1, :] + A.conjugate() * abc[..., 2, :]) / 3.0)
 
 
 def superimposed(now: Complex, earlier: Complex) -> Complex:

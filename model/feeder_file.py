@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
-from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
-from .errors import Fault, InputError, Report
+from .errors import InputError
 from .feeder import checked_feeder
 from .feeder_document import document_from_feeder
 from .fields import did_you_mean
 from .parts import Feeder
-from .toml_lines import locator, syntax_error_line
+from .toml_file import parse_toml, read_text, toml_rows
 
 __all__ = ["dump_feeder", "feeder_from_toml", "load_feeder", "read_feeder", "shipped_feeders"]
 
@@ -28,14 +25,7 @@ def read_feeder(path: Path) -> Feeder:
     InputError
         If the file cannot be read, or with every fault of what it says.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError.single(str(path), "", None, "must be UTF-8 text") from error
-    except OSError as error:
-        reason = error.strerror or type(error).__name__
-        raise InputError.single(str(path), "", reason, "must be a file to read") from error
-    return feeder_from_toml(text, str(path))
+    return feeder_from_toml(read_text(path), str(path))
 
 
 def feeder_from_toml(text: str, source_name: str) -> Feeder:
@@ -46,16 +36,7 @@ def feeder_from_toml(text: str, source_name: str) -> Feeder:
     InputError
         With every fault of the text.
     """
-    try:
-        document = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError([_syntax_fault(error, text, source_name)]) from error
-    return checked_feeder(Report(source=source_name, document=document, locate=locator(text)))
-
-
-def _syntax_fault(error: Exception, text: str, source_name: str) -> Fault:
-    message, line = syntax_error_line(str(error), text)
-    return Fault(source=source_name, line=line, where="", wanted=f"is not valid TOML: {message}")
+    return checked_feeder(parse_toml(text, source_name))
 
 
 def load_feeder(name_or_path: str) -> Feeder:
@@ -100,27 +81,10 @@ def dump_feeder(feeder: Feeder) -> str:
     document = document_from_feeder(feeder)
     blocks: list[str] = []
     top = {key: value for key, value in document.items() if not isinstance(value, (dict, list))}
-    blocks.append(_rows_of(top))
+    blocks.append(toml_rows(top))
     for table, value in document.items():
         if isinstance(value, dict):
-            blocks.append(f"[{table}]\n{_rows_of(value)}")
+            blocks.append(f"[{table}]\n{toml_rows(value)}")
         elif isinstance(value, list):
-            blocks.extend(f"[[{table}]]\n{_rows_of(row)}" for row in value)
+            blocks.extend(f"[[{table}]]\n{toml_rows(row)}" for row in value)
     return "\n".join(blocks)
-
-
-def _rows_of(table: Mapping[str, object]) -> str:
-    return "".join(f"{key} = {_toml_value(value)}\n" for key, value in table.items())
-
-
-def _toml_value(value: object) -> str:
-    """Return a value as TOML; the escapes of JSON are among TOML's."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, float):
-        return repr(float(value))
-    if isinstance(value, Sequence):
-        return f"[{', '.join(_toml_value(item) for item in value)}]"
-    return str(value)

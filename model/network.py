@@ -172,7 +172,8 @@ def _tee(line: str, fraction: float) -> str:
 def _node_name(feeder: Feeder, place: Place) -> str:
     if place.bus is not None:
         return place.bus
-    assert place.line is not None and place.at is not None
+    assert place.line is not None
+    assert place.at is not None
     line = next(item for item in feeder.lines if item.name == place.line)
     if place.at == 0.0:
         return line.from_bus

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .ladder import solve_block
 from .network import Network
-from .states import Answer, Probes, State, Work, workspace
+from .states import Answer, Probes, State, workspace
 
 __all__ = ["FLOOR_PU", "all_probes", "new_answer", "solve", "steady_state"]
 
@@ -31,7 +31,7 @@ def all_probes(network: Network) -> Probes:
 
 def steady_state(network: Network, scenarios: int = 1) -> State:
     """The file's own loads, connections and EMF, without any event."""
-    loads, units = len(network.loads), len(network.units)
+    loads = len(network.loads)
     return State(
         emf_pu=np.full(scenarios, network.emf_pu),
         load_scale=np.ones((loads, scenarios)),
@@ -64,8 +64,6 @@ def solve(
     *,
     start: NDArray[np.float64] | None = None,
     tolerance_pu: float = TOLERANCE_PU,
-    answer: Answer | None = None,
-    work: Work | None = None,
 ) -> Answer:
     """Solve every scenario of ``state``.
 
@@ -81,8 +79,6 @@ def solve(
         ``unit_v_pu`` of the state before the event; by default nominal.
     tolerance_pu : float
         Largest change of a winding voltage in the last pass.
-    answer, work : optional
-        Buffers to write into, for callers that solve block after block.
 
     Returns
     -------
@@ -96,10 +92,8 @@ def solve(
     """
     _check(network, state)
     probes = probes or all_probes(network)
-    if answer is None:
-        answer = new_answer(network, probes, state.emf_pu.size)
-    if work is None:
-        work = workspace(len(network.nodes), len(network.units))
+    answer = new_answer(network, probes, state.emf_pu.size)
+    work = workspace(len(network.nodes), len(network.units))
     answer.unit_v_pu[:] = 1.0 if start is None else start
     solve_block(network.tree, state, probes, work, answer, tolerance_pu, MOST_PASSES, FLOOR_PU)
     return answer

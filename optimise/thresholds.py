@@ -84,9 +84,7 @@ def choose(
     settings = grid.i_set_a[i], grid.v_set_pu[v], grid.z_set_ohm[z]
     security = margins(front, *settings)
     stiff = count_tensor(grid, stiff_opens)[v, i, z]
-    distance = sum(
-        np.abs(np.log(own / wanted)) for own, wanted in zip(settings, reference, strict=True)
-    )
+    distance = np.abs(np.log(np.stack(settings) / np.array(reference)[:, None])).sum(axis=0)
     # lexsort: last key first
     pick = int(np.lexsort((z, i, v, distance, -stiff, -security))[0])
     return Choice(

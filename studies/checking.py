@@ -22,7 +22,7 @@ __all__ = ["check_command", "summary"]
 def check_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code. Faults of the file have ended it before."""
     feeder = load_feeder(args.feeder)
-    study = default_study(feeder.name)
+    study = default_study(args.feeder)
     check_study(study, feeder, "study.toml")
     found = summary(feeder, study)
     if args.plot:

@@ -66,7 +66,7 @@ def say(text: str) -> None:
 def size_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code."""
     feeder = load_feeder(args.feeder)
-    study = read_study(args.study) if args.study else default_study(feeder.name)
+    study = read_study(args.study) if args.study else default_study(args.feeder)
     check_study(study, feeder, str(args.study or "study.toml"))
     if not feeder.sections:
         raise InputError.single(feeder.name, "sections", "none", "must name at least one section")

@@ -273,7 +273,8 @@ def _table(feeder: Feeder, broken: Break, answer: dict[str, Any]) -> str:
     ]
     for row in answer["sections"]:
         lines.append(
-            f"{row['local'] + '→' + row['remote']:<12}{row['di1_a']:>9.4f}{row['di1_star_a']:>10.4f}"
+            f"{row['local'] + '→' + row['remote']:<12}"
+            f"{row['di1_a']:>9.4f}{row['di1_star_a']:>10.4f}"
             f"{row['dv1_pu'] * 100:>9.3f}{_polar(row['z1_ohm']):>18}   {row['reason']}"
         )
     return "\n".join(lines) + "\n"

@@ -25,7 +25,7 @@ def distance_share(
 def path_starts(
     case: Case, point: int, on_path: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Per edge of a path: km from the point to its nearer end, and whether that is the upper end."""
+    """Per edge of a path: km from the point to its nearer end; whether that is the upper end."""
     network = case.network
     ends = [
         (p.ends if network.upward[k] else p.ends[::-1]) if p is not None else ("", "")

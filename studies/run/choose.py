@@ -119,7 +119,7 @@ def _add(parts: list[Trained | Training]) -> Training:
 
 
 def choices(case: Case, grid: Grid, training: Training) -> list[tuple[Choice | None, ...]]:
-    """Per terminal: the chosen setting, the best at the reference V_set, None where there is none."""
+    """Per terminal: the chosen setting and the best at the reference V_set; None: there is none."""
     reference = case.study.reference
     wanted = (reference.i_set_a, reference.v_set_pct / 100.0, reference.z_set_ohm)
     at_reference_v = np.flatnonzero(np.isclose(grid.v_set_pu, wanted[1]))

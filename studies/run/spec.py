@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from ... import model
-from ...model.errors import Fault, InputError, KeyPath, Report
+from ...model.errors import InputError, KeyPath, Report
 from ...model.feeder_file import shipped_feeders
 from ...model.fields import as_toml, did_you_mean
 from ...model.parts import Feeder
 from ...model.table_check import check_table
-from ...model.toml_lines import locator, syntax_error_line
+from ...model.toml_file import parse_toml, read_text, toml_rows
 from .spec_fields import DOCUMENT, EVENTS, FORMAT, STEPS, TABLES, as_table
 from .spec_parts import (
     Ambient,
@@ -67,14 +65,7 @@ def read_study(path: Path) -> Study:
     InputError
         If the file cannot be read, or with every fault of what it says.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError.single(str(path), "", None, "must be UTF-8 text") from error
-    except OSError as error:
-        reason = error.strerror or type(error).__name__
-        raise InputError.single(str(path), "", reason, "must be a file to read") from error
-    return study_from_toml(text, str(path))
+    return study_from_toml(read_text(path), str(path))
 
 
 def study_from_toml(text: str, source_name: str) -> Study:
@@ -90,13 +81,7 @@ def study_from_toml(text: str, source_name: str) -> Study:
     >>> study_from_toml("format = 1", "empty.toml") == Study()
     True
     """
-    try:
-        document = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        message, line = syntax_error_line(str(error), text)
-        wanted = f"is not valid TOML: {message}"
-        raise InputError([Fault(source=source_name, line=line, where="", wanted=wanted)]) from error
-    report = Report(source=source_name, document=document, locate=locator(text))
+    report = parse_toml(text, source_name)
     study = _study(report)
     report.raise_if_any()
     return study
@@ -331,21 +316,5 @@ def dump_study(study: Study) -> str:
     """
     blocks = [f"format = {FORMAT}\n"]
     for table, part in _parts(study).items():
-        lines = (f"{key} = {_toml_value(value)}\n" for key, value in as_table(part).items())
-        blocks.append(f"[{table}]\n{''.join(lines)}")
+        blocks.append(f"[{table}]\n{toml_rows(as_table(part))}")
     return "\n".join(blocks)
-
-
-def _toml_value(value: object) -> str:
-    """Return a value as TOML; the escapes of JSON are among TOML's."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, float):
-        return repr(float(value))
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{key} = {_toml_value(item)}' for key, item in value.items())} }}"
-    if isinstance(value, Sequence):
-        return f"[{', '.join(_toml_value(item) for item in value)}]"
-    return str(value)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import typing
 import zipfile
 from dataclasses import fields, is_dataclass
@@ -34,7 +33,7 @@ def write_whole(path: Path, content: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_bytes(content)
-        os.replace(part, path)
+        part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
         raise OpenPhaseError(f"{path}: cannot be written: {error.strerror or error}") from error

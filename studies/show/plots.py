@@ -1,0 +1,496 @@
+"""Pictures: each takes data and draws it; none computes, and none opens a window.
+
+Figures are built without pyplot and saved without dates or versions, so that equal data
+give equal bytes.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any, TypeVar
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
+from numpy.typing import NDArray
+
+from ...model.parts import Feeder
+from .feeder_layout import FeederLayout, Mark, Tie, lay_out
+from .views import Bar, EvidenceView, OverviewView, ProfileView
+
+__all__ = [
+    "house_style",
+    "plot_evidence",
+    "plot_feeder",
+    "plot_overview",
+    "plot_profile",
+    "png_of",
+    "save_figure",
+    "save_png",
+]
+
+T = TypeVar("T")
+Real = NDArray[np.float64]
+
+DPI = 120
+
+STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",  # ships with matplotlib
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "svg.hashsalt": "openphase",
+    "text.parse_math": False,  # a name may hold a dollar sign
+}
+
+# Okabe and Ito's colours, which the colour-blind tell apart
+BLUE, ORANGE, GREEN, RED, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
+SKY, YELLOW, GREY = "#56B4E9", "#F0E442", "#777777"
+
+CLASSES: dict[tuple[str, str], tuple[str, str, str]] = {
+    ("open_inside", "inside"): ("break inside: must trip", BLUE, "o"),
+    ("load_step", "inside"): ("load step inside", ORANGE, "s"),
+    ("load_step", "outside"): ("load step outside", RED, "^"),
+    ("source_step", "outside"): ("source step", GREEN, "D"),
+    ("open_outside", "outside"): ("break outside", PURPLE, "v"),
+}
+"""Name and side of a class -> its words, colour and marker."""
+
+SECTION_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
+CROWDED = 24  #: units beyond which a schematic shows their names only
+
+
+# ---- figures ----
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Draw in the project's style, whatever the user's matplotlibrc says."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        yield
+
+
+def save_png(figure: Figure | SubFigure | None, target: Path | IO[bytes]) -> None:
+    """Write a figure as PNG: equal figures give equal bytes."""
+    _save(figure, target, "png", {"Software": None})
+
+
+def save_figure(figure: Figure | SubFigure | None, path: Path) -> None:
+    """Write a figure as PNG or SVG, as the file's name says.
+
+    Raises ValueError for any other ending.
+    """
+    if path.suffix.lower() == ".svg":
+        _save(figure, path, "svg", {"Date": None, "Creator": None})
+    elif path.suffix.lower() == ".png":
+        save_png(figure, path)
+    else:
+        raise ValueError(f"must end in .png or .svg, got '{path.suffix}'")
+
+
+def _save(
+    figure: Figure | SubFigure | None,
+    target: Path | IO[bytes],
+    form: str,
+    metadata: dict[str, str | None],
+) -> None:
+    if not isinstance(figure, Figure):
+        raise TypeError(f"must be a whole figure, got {type(figure).__name__}")
+    with house_style():
+        figure.savefig(target, format=form, dpi=DPI, metadata=metadata, facecolor="white")
+
+
+def png_of(plot: Callable[[T], Axes], data: T) -> bytes:
+    """The picture that ``plot`` makes of ``data``, in the project's style."""
+    buffer = io.BytesIO()
+    with house_style():
+        save_png(plot(data).get_figure(), buffer)
+    return buffer.getvalue()
+
+
+def _axes(ax: Axes | None, width: float, height: float) -> Axes:
+    """``ax``, or the axes of a new figure of this size in inches."""
+    if ax is not None:
+        return ax
+    with house_style():
+        return Figure(figsize=(width, height), layout="constrained").add_subplot()
+
+
+# ---- evidence ----
+
+
+def plot_evidence(view: EvidenceView, ax: Axes | None = None) -> Axes:
+    """Draw a terminal's events in the plane of |ΔI1| and |Z1|, and the settings among them."""
+    ax = _axes(ax, 8.6, 7.4)
+    low = np.array([view.limits_a[0], view.limits_ohm[0]])
+    high = np.array([view.limits_a[1], view.limits_ohm[1]])
+    ax.set(xscale="log", yscale="log", xlim=view.limits_a, ylim=view.limits_ohm)
+    handles = [_draw_cloud(ax, cloud, low, high) for cloud in view.clouds]
+    handles = handles[-1:] + handles[:-1]  # what must trip is drawn last and named first
+    handles += _draw_borders(ax, view)
+    handles += _draw_settings(ax, view)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    ax.grid(True)
+    ax.set_xlabel("|ΔI1| and I_set [A]")
+    ax.set_ylabel("|Z1| and Z_set [Ω]")
+    sign = "Re Z1 < 0 and " if view.negative_sign else ""
+    ax.set_title(
+        f"{view.terminal}: validation events (a sample of them) at V_set {_percent(view.v_set_pu)}"
+        f"\nfull colour: {sign}|ΔV1| ≤ V_set, so every setting to its lower left trips; "
+        "faint: cannot trip",
+        fontsize=9.5,
+    )
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2)
+    return ax
+
+
+def _draw_cloud(ax: Axes, cloud: Any, low: Real, high: Real) -> Line2D:
+    """Draw one class; what cannot trip is faint and hollow. Returns its legend entry."""
+    text, colour, marker = CLASSES[cloud.name, cloud.side]
+    must_trip = cloud.name == "open_inside"
+    size = 24 if must_trip else 13
+    x = np.clip(cloud.di1_a, low[0] * 1.04, high[0] / 1.04)
+    y = np.clip(cloud.z1_ohm, low[1] * 1.05, high[1] / 1.05)
+    unable = ~cloud.able
+    ax.scatter(
+        x[unable],
+        y[unable],
+        s=size,
+        marker=marker,
+        facecolors="none",
+        edgecolors=colour,
+        linewidths=0.6,
+        alpha=0.35 if must_trip else 0.22,
+        zorder=2,
+    )
+    ax.scatter(
+        x[cloud.able],
+        y[cloud.able],
+        s=size,
+        marker=marker,
+        color=colour,
+        edgecolors="white",
+        linewidths=0.3,
+        alpha=0.9,
+        zorder=4 if must_trip else 3,
+    )
+    able = int(cloud.able.sum())
+    return Line2D(
+        [],
+        [],
+        ls="",
+        marker=marker,
+        color=colour,
+        markersize=5,
+        label=f"{text} ({able} of {x.size} shown can trip)",
+    )
+
+
+def _draw_borders(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
+    """Draw the staircase of the training sample, as it is and with the demanded margin."""
+    floor = view.limits_a[0], view.limits_ohm[0]
+    x, y = (np.maximum(own, low) for own, low in zip(view.border, floor, strict=True))
+    ax.fill_between(x, y, floor[1], color="#d9b38c", alpha=0.28, lw=0, zorder=1)
+    ax.plot(x, y, color="#5b3a1a", lw=1.3, zorder=5)
+    mx, my = (np.maximum(own, low) for own, low in zip(view.margin_border, floor, strict=True))
+    ax.plot(mx, my, color="#5b3a1a", lw=1.1, ls=(0, (4, 2)), zorder=5)
+    return [
+        Patch(
+            facecolor="#f3e6d9",
+            edgecolor="#5b3a1a",
+            label="settings that trip falsely in the training sample",
+        ),
+        Line2D(
+            [],
+            [],
+            color="#5b3a1a",
+            lw=1.1,
+            ls=(0, (4, 2)),
+            label=f"border at margin {view.margin:g}",
+        ),
+    ]
+
+
+def _draw_settings(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
+    """Draw the chosen setting with what it trips, the reference, and the device's range."""
+    handles: list[Line2D | Patch] = []
+    right, top = view.limits_a[1], view.limits_ohm[1]
+    if view.chosen is not None:
+        own = view.chosen
+        ax.fill_between(
+            [own.i_set_a, right], own.z_set_ohm, top, color=SKY, alpha=0.13, lw=0, zorder=0.5
+        )
+        ax.plot(
+            [own.i_set_a, own.i_set_a, right],
+            [top, own.z_set_ohm, own.z_set_ohm],
+            color=BLUE,
+            lw=0.9,
+            zorder=5,
+        )
+        label = (
+            f"chosen: {own.i_set_a:g} A, {_percent(own.v_set_pu)}, {own.z_set_ohm:g} Ω, "
+            "and what it trips"
+        )
+        handles += ax.plot(
+            own.i_set_a,
+            own.z_set_ohm,
+            ls="",
+            marker="P",
+            color="black",
+            markeredgecolor="white",
+            markersize=11,
+            zorder=7,
+            label=label,
+        )
+    own = view.reference
+    handles += ax.plot(
+        own.i_set_a,
+        own.z_set_ohm,
+        ls="",
+        marker="X",
+        color=YELLOW,
+        markeredgecolor="black",
+        markersize=10,
+        zorder=6,
+        label=f"reference: {own.i_set_a:g} A, {_percent(own.v_set_pu)}, {own.z_set_ohm:g} Ω",
+    )
+    (x0, x1), (y0, y1) = view.device_a, view.device_ohm
+    handles += ax.plot(
+        [x0, x1, x1, x0, x0],
+        [y0, y0, y1, y1, y0],
+        color=GREY,
+        lw=0.8,
+        ls=":",
+        zorder=1.5,
+        label="range of the device",
+    )
+    return handles
+
+
+# ---- dependability ----
+
+
+def plot_profile(view: ProfileView, ax: Axes | None = None) -> Axes:
+    """Draw the share of breaks that a terminal finds, along its section."""
+    ax = _axes(ax, 8.6, 3.9)
+    x = view.edges_km
+    ax.stairs(view.high, x, baseline=view.low, fill=True, color=SKY, alpha=0.4, lw=0)
+    ax.stairs(view.share, x, baseline=None, color=BLUE, lw=1.6)
+    for start, stop in view.blind_km:
+        ax.axvspan(
+            start, stop, facecolor="#eeeeee", edgecolor="#bbbbbb", hatch="//", lw=0, zorder=0
+        )
+    for km, text in view.tees:
+        ax.plot([km, km], [1.03, 1.1], color=GREY, lw=1.0, clip_on=False)
+        ax.text(km, 1.12, text, ha="center", va="bottom", fontsize=8, color="#444444")
+    ax.set(xlim=(x[0], x[-1]), ylim=(0.0, 1.03))
+    ax.yaxis.set_major_formatter(PercentFormatter(1.0))
+    ax.grid(True)
+    ax.set_xlabel(f"distance of the break from {view.local}, towards {view.remote} [km]")
+    ax.set_ylabel("found, of all breaks there")
+    ax.set_title(
+        f"{view.terminal}: where breaks are found; {view.found:,} of all {view.breaks:,} internal "
+        "breaks, blind ends included",
+        fontsize=9.5,
+        pad=30 if view.tees else 8,
+    )
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=BLUE, lw=1.6, label="share found"),
+        Patch(color=SKY, alpha=0.4, label=f"{view.confidence:.0%} interval of each stretch"),
+    ]
+    if view.blind_km:
+        handles.append(
+            Patch(
+                facecolor="#eeeeee",
+                edgecolor="#bbbbbb",
+                hatch="//",
+                label="nothing connected beyond: not to be seen",
+            )
+        )
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
+    return ax
+
+
+OVERVIEW = ((BLUE, ""), (SKY, ""), ("#bdbdbd", "///"))  #: colour and hatch of each setting
+
+
+def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
+    """Draw the dependability of the compared settings of every judged terminal."""
+    ax = _axes(ax, 8.6, 1.5 + 0.95 * len(view.terminals))
+    step = 0.27
+    for t, bars in enumerate(view.bars):
+        for n, bar in enumerate(bars):
+            _draw_bar(ax, t + step * (n - (len(bars) - 1) / 2), bar, n, 0.9 * step)
+    ax.set_yticks(range(len(view.terminals)), view.terminals)
+    ax.set(xlim=(0.0, 1.0), ylim=(len(view.terminals) - 0.5, -0.5))
+    ax.tick_params(axis="y", length=0)
+    ax.xaxis.set_major_formatter(PercentFormatter(1.0))
+    ax.grid(True, axis="x")
+    ax.set_xlabel("dependability: breaks found, of those with something connected beyond")
+    ax.set_title("Breaks found, with intervals; right of each bar its false trips, k of n events")
+    handles = [
+        Patch(facecolor=colour, edgecolor="white", hatch=hatch, label=name)
+        for name, (colour, hatch) in zip(view.names, OVERVIEW, strict=True)
+    ]
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.55 / (len(bars) * 1.0)))
+    return ax
+
+
+def _draw_bar(ax: Axes, y: float, bar: Bar, n: int, height: float) -> None:
+    colour, hatch = OVERVIEW[n]
+    if bar.share is None:
+        ax.text(0.01, y, "no setting keeps the margin", va="center", fontsize=8, color="#444444")
+        return
+    ax.barh(y, bar.share, height, color=colour, edgecolor="white", hatch=hatch, lw=0)
+    ax.plot([bar.low, bar.high], [y, y], color="black", lw=1.4, solid_capstyle="butt")
+    bad = bar.false_trips > 0
+    ax.text(
+        bar.high + 0.012,
+        y,
+        f"{bar.false_trips:,} of {bar.trials:,}",
+        va="center",
+        fontsize=8,
+        color="#a33b00" if bad else "#444444",
+        weight="bold" if bad else "normal",
+        clip_on=False,
+    )
+
+
+def _percent(pu: float) -> str:
+    return f"{pu * 100:g} %"
+
+
+# ---- the feeder ----
+
+
+def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
+    """Draw a schematic of a feeder: km from the source, one row for each branch."""
+    layout = lay_out(feeder)
+    ax = _axes(ax, 11.0, 1.6 + 1.35 * layout.rows)
+    _draw_wires(ax, layout)
+    for tie in layout.ties:
+        _draw_tie(ax, tie, layout.reach_km)
+    for unit in layout.units:
+        _draw_unit(ax, unit, len(layout.units) > CROWDED)
+    for point in layout.points:
+        ax.plot(
+            point.km,
+            point.row,
+            "o",
+            color="white",
+            markeredgecolor="black",
+            ms=8,
+            mew=1.4,
+            zorder=5,
+        )
+        _write(ax, point, point.text, below=True, size=9.5, weight="bold")
+    ax.plot(0, 0, "s", color="black", ms=11, zorder=4)
+    source = Mark(text=layout.source, km=0.0, row=0)
+    _write(ax, source, layout.source, below=False, size=9.0, weight="normal")
+    ax.set(xlim=(-0.04 * layout.reach_km, 1.09 * layout.reach_km), ylim=(layout.rows - 0.45, -0.75))
+    ax.set_yticks([])
+    ax.spines["left"].set_visible(False)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_xlabel("distance from the source along the line [km]")
+    ax.set_title(
+        f"{layout.name}: {len(feeder.lines)} lines, {len(feeder.points)} measuring points, "
+        f"{len(feeder.sections)} sections"
+    )
+    handles = [
+        Line2D([], [], color=SECTION_COLOURS[n % 6], lw=4, label=f"section {name}")
+        for n, name in enumerate(layout.sections)
+    ]
+    handles += [
+        Line2D(
+            [], [], ls="", marker="o", color="white", mec="black", ms=7, label="measuring point"
+        ),
+        Line2D([], [], ls="", marker="v", color="black", ms=6, label="transformer or load"),
+        Line2D([], [], ls="--", marker="s", color="black", mfc="white", ms=7, label="open switch"),
+    ]
+    ax.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.4 / (1 + layout.rows)), ncols=4
+    )
+    return ax
+
+
+def _draw_wires(ax: Axes, layout: FeederLayout) -> None:
+    for wire in layout.wires:
+        x, y = [wire.start_km, wire.start_km, wire.stop_km], [wire.from_row, wire.row, wire.row]
+        if not wire.is_line:
+            ax.plot(x, y, color="black", lw=1.2, zorder=1)
+            ax.plot(wire.stop_km, wire.row, "s", color="black", ms=6, zorder=3)
+            continue
+        if not wire.sections:
+            ax.plot(x, y, color="#999999", lw=2.0, zorder=1)
+        # sections that share a line lie on top of each other, the later the thinner
+        for n, section in enumerate(wire.sections):
+            colour = SECTION_COLOURS[section % len(SECTION_COLOURS)]
+            width = 5.0 * (1.0 - n / len(wire.sections))
+            ax.plot(x, y, color=colour, lw=width, solid_joinstyle="miter", zorder=1 + 0.01 * n)
+
+
+def _draw_tie(ax: Axes, tie: Tie, reach_km: float) -> None:
+    (x0, y0), (x1, y1) = tie.ends
+    if tie.at_row_ends:
+        aside = max(x0, x1) + 0.03 * reach_km
+        x, y, middle = [x0, aside, aside, x1], [y0, y0, y1, y1], aside
+    else:
+        x, y, middle = [x0, x1], [y0, y1], (x0 + x1) / 2
+    ax.plot(x, y, color="black", lw=1.1, ls="--", zorder=0.5)
+    ax.plot(middle, (y0 + y1) / 2, "s", color="white", mec="black", ms=9, zorder=3)
+    ax.annotate(
+        f"{tie.name}\nopen",
+        (middle, (y0 + y1) / 2),
+        xytext=(9, 0),
+        textcoords="offset points",
+        va="center",
+        fontsize=8.5,
+    )
+
+
+def _draw_unit(ax: Axes, unit: Mark, crowded: bool) -> None:
+    tip = unit.row - (0.12 if crowded else 0.2)
+    ax.plot([unit.km, unit.km], [unit.row, tip], color="black", lw=1.0, zorder=0.8)
+    ax.plot(unit.km, tip, "^", color="black", ms=4 if crowded else 6, zorder=3)
+    text = unit.text.partition("\n")[0] if crowded else unit.text
+    ax.annotate(
+        text,
+        (unit.km, tip),
+        xytext=(0, 5),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=6 if crowded else 8.5,
+        rotation=90 if crowded else 0,
+        linespacing=1.15,
+    )
+
+
+def _write(ax: Axes, at: Mark, text: str, *, below: bool, size: float, weight: str) -> None:
+    ax.annotate(
+        text,
+        (at.km, at.row),
+        xytext=(0, -9 if below else 9),
+        textcoords="offset points",
+        ha="center",
+        va="top" if below else "bottom",
+        fontsize=size,
+        weight=weight,
+    )

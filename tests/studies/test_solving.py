@@ -1,0 +1,175 @@
+"""``solve`` on the paper's feeder, to the printed digits of the published and derived values."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from openphase.model import InputError, load_feeder
+from openphase.studies.cli import main
+from openphase.studies.settings_file import read_settings
+from openphase.studies.solving import parse_break, solve_break
+
+V_NOMINAL = 12_000 / 3**0.5
+
+
+@pytest.fixture(scope="module")
+def radial() -> dict[str, Any]:
+    feeder = load_feeder("paper")
+    return solve_break(feeder, parse_break("R2-R3:0.6:a", feeder), frozenset())
+
+
+def terminal(answer: dict[str, Any], local: str, remote: str) -> dict[str, Any]:
+    rows = answer["sections"]
+    return next(row for row in rows if (row["local"], row["remote"]) == (local, remote))
+
+
+def change(pair: dict[str, Any], phase: int) -> float:
+    before, after = pair["before"][phase], pair["after"][phase]
+    return abs(complex(*after) - complex(*before))
+
+
+def line_change(answer: dict[str, Any], line: str, end: str, phase: int) -> float:
+    both = answer["lines"][line]
+    return change({"before": both["before"][end], "after": both["after"][end]}, phase)
+
+
+def test_impedances_of_the_internal_and_the_external_terminal(radial: dict[str, Any]) -> None:
+    z_r2 = complex(*terminal(radial, "R2", "R3")["z1_ohm"])
+    assert f"{abs(z_r2):.2f}" == "288.30"
+    assert f"{np.degrees(np.angle(z_r2)):.1f}" == "-179.3"
+    assert f"{abs(complex(*terminal(radial, 'R1', 'R2')['z1_ohm'])):.4f}" == "0.3901"
+
+
+def test_voltage_and_current_changes(radial: dict[str, Any]) -> None:
+    assert f"{change(radial['buses']['R3'], 0) / V_NOMINAL:.5f}" == "0.09289"
+    assert f"{terminal(radial, 'R3', 'R4')['dv1_pu']:.5f}" == "0.03323"
+    assert f"{line_change(radial, 'R3-R4', 'from_end', 0):.4f}" == "3.0845"
+    assert f"{line_change(radial, 'R2-R3', 'from_end', 0):.3f}" == "23.936"
+    assert f"{terminal(radial, 'R2', 'R3')['di1_a']:.4f}" == "0.7979"
+
+
+def test_phase_impedance(radial: dict[str, Any]) -> None:
+    z_a = complex(*terminal(radial, "R2", "R3")["zabc_ohm"][0])
+    assert f"{abs(z_a):.3f}" == "28.101"
+
+
+def test_closed_loop() -> None:
+    feeder = load_feeder("paper")
+    answer = solve_break(feeder, parse_break("R2-R3:0.6:a", feeder), frozenset({"R4"}))
+    ours = [complex(*terminal(answer, *pair)["z1_ohm"]) for pair in (("R2", "R3"), ("R3", "R2"))]
+    assert [f"{abs(z):.4f}" for z in ours] == ["2.4051", "2.4107"]
+    assert all(z.real < 0 for z in ours)
+
+
+def test_load_side_impedance_is_undefined(radial: dict[str, Any]) -> None:
+    row = terminal(radial, "R3", "R2")
+    assert row["z1_ohm"] is None
+    assert row["di1_star_a"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_currents_enter_a_line_at_both_ends(radial: dict[str, Any]) -> None:
+    ends = radial["lines"]["R2-R3"]["after"]
+    assert ends["from_end"][0][0] > 0 > ends["to_end"][1][0] * ends["from_end"][1][0]
+    for line in radial["lines"].values():
+        for state in line.values():
+            assert all(value is not None for end in state.values() for value in end)
+
+
+def test_the_broken_phase_carries_nothing_at_the_stubs(radial: dict[str, Any]) -> None:
+    assert set(radial["buses"]) == {"SUB", "R2", "R3", "R4", "R4b", "R2-R3.p", "R2-R3.q"}
+    p, q = radial["buses"]["R2-R3.p"], radial["buses"]["R2-R3.q"]
+    assert p["before"] == q["before"]
+    assert abs(complex(*p["after"][0]) - complex(*q["after"][0])) > 100
+    assert p["after"][1] == pytest.approx(q["after"][1])
+
+
+def test_upstream_stub_is_p_on_a_line_that_points_to_the_source() -> None:
+    feeder = load_feeder("paper")
+    buses = solve_break(feeder, parse_break("R4-R5:0.7:abc", feeder), frozenset())["buses"]
+    assert abs(complex(*buses["R4-R5.p"]["after"][0])) > 6000  # towards SUB: alive
+    assert complex(*buses["R4-R5.q"]["after"][0]) == 0
+
+
+def test_a_conductor_connected_to_nothing_has_no_voltage() -> None:
+    feeder = load_feeder("paper")
+    answer = solve_break(feeder, parse_break("R3-R4:0.95:ab", feeder), frozenset())
+    for name in ("R4", "R3-R4.q"):
+        assert answer["buses"][name]["after"][:2] == [None, None]
+        assert answer["buses"][name]["after"][2] is not None
+
+
+def test_json_is_one_object_on_stdout(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["solve", "paper", "--open", "R2-R3:0.6:a", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert list(answer) == ["buses", "lines", "sections"]
+    assert list(answer["sections"][0]) == [
+        "local", "remote", "di1_a", "di1_star_a", "dv1_pu", "z1_ohm", "zabc_ohm", "trip", "reason",
+    ]  # fmt: skip
+
+
+def test_a_sheet_decides_who_trips(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sheet = tmp_path / "settings.csv"
+    sheet.write_text("local,remote,i_set_a,v_set_pu,z_set_ohm\nR2,R3,0.7,0.05,5\nR3,R2,,,\n")
+    assert (
+        main(["solve", "paper", "--open", "R2-R3:0.6:a", "--settings", str(sheet), "--json"]) == 0
+    )
+    rows = json.loads(capsys.readouterr().out)["sections"]
+    assert [(row["local"], row["remote"]) for row in rows if row["trip"]] == [("R2", "R3")]
+    assert terminal({"sections": rows}, "R3", "R2")["reason"] == "no setting in the sheet"
+
+
+@pytest.mark.parametrize(
+    ("text", "faults"),
+    [
+        ("R2-R3", ["--open: must read LINE:FRACTION:PHASES, got R2-R3"]),
+        (
+            "R2-R9:1.5:ax",
+            [
+                "--open: line must be a line of 'paper' (did you mean 'R2-R3'?), got R2-R9",
+                "--open: fraction must be a number in 0..1, got 1.5",
+                "--open: phases must be one, two or three of a, b, c, got ax",
+            ],
+        ),
+        ("R2-R3:nan:aa", None),
+    ],
+)
+def test_a_wrong_break_is_answered_with_all_its_faults(
+    text: str, faults: list[str] | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["solve", "paper", "--open", text]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "Traceback" not in captured.err
+    if faults is not None:
+        assert captured.err.splitlines()[: len(faults)] == faults
+
+
+def test_an_unknown_switch_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["solve", "paper", "--open", "R2-R3:0.6:a", "--close", "R5"]) == 2
+    assert "must be a switch of 'paper'" in capsys.readouterr().err
+
+
+def test_all_faults_of_a_sheet_are_reported(tmp_path: Path) -> None:
+    sheet = tmp_path / "bad.csv"
+    sheet.write_text(
+        "local,remote,i_set_a,v_set_pu,z_set_ohm\n"
+        "R1,R2,1,.05,5\nR1,R2,1,.05,5\nR1,R9,x,,5\nR2,R3,0.5,inf,-5\n"
+    )
+    with pytest.raises(InputError) as caught:
+        read_settings(sheet, load_feeder("paper"))
+    said = str(caught.value).splitlines()
+    assert [line.split(":")[1] for line in said[:4]] == ["3", "4", "5", "5"]
+    assert said[-1] == "4 faults"
+
+
+def test_missing_columns_and_files(tmp_path: Path) -> None:
+    sheet = tmp_path / "bad.csv"
+    sheet.write_text("local,remote,i_set_a\n")
+    with pytest.raises(InputError, match="column v_set_pu must be in the sheet"):
+        read_settings(sheet, load_feeder("paper"))
+    with pytest.raises(InputError, match="must be a CSV file to read"):
+        read_settings(tmp_path / "none.csv", load_feeder("paper"))
