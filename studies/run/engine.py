@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ...detector.evidence import Evidence, Phasors, evidence_of
 from ...detector.instruments import measure
 from ...model.points import into_line, point_probes
-from ...model.solve import solve
-from ...model.states import Answer
+from ...model.solve import solve, steady_state
+from ...model.states import Answer, State
 from .classes import sides
 from .draw import Case, Scenarios
 
@@ -38,12 +38,18 @@ class Observed:
 def observe(case: Case, scenarios: Scenarios) -> Observed:
     """Solve both states, measure, and reduce to evidence."""
     probes = point_probes(case.points)
-    before = solve(case.network, scenarios.before, probes, tolerance_pu=TOLERANCE_PU)
+    before = solve(
+        case.network,
+        scenarios.before,
+        probes,
+        start=_guess(case, scenarios.before),
+        tolerance_pu=TOLERANCE_PU,
+    )
     after = solve(
         case.network,
         scenarios.after,
         probes,
-        start=before.unit_v_pu,
+        start=before.unit_v_pu * (scenarios.after.emf_pu / scenarios.before.emf_pu),
         tolerance_pu=TOLERANCE_PU,
     )
     edge = scenarios.event.edge
@@ -59,6 +65,12 @@ def observe(case: Case, scenarios: Scenarios) -> Observed:
         share=scenarios.event.share,
         flags=before.flags | after.flags,
     )
+
+
+def _guess(case: Case, state: State) -> NDArray[np.float64]:
+    """Winding voltages near the solution: the drop at nominal load, scaled by the mean load."""
+    drop = 1.0 - solve(case.network, steady_state(case.network)).unit_v_pu
+    return np.asarray(1.0 - drop * state.load_scale.mean(axis=0))
 
 
 def _measured(case: Case, frames: tuple[Answer, Answer], scenarios: Scenarios) -> Phasors:
