@@ -43,6 +43,8 @@ def main() -> int:
     if not asked.no_peers:
         result["peers"] = _run("run_peers.py")
         _print_peers(result["peers"])
+    result["machine"]["load_at_end"] = _load()
+    print(_load_line(result["machine"]))
     if asked.json:
         asked.json.write_text(json.dumps(result, indent=2, ensure_ascii=False) + "\n", "utf-8")
     return int(asked.check and not _passed(result))
@@ -91,10 +93,16 @@ def _machine() -> Result:
         "cpu": models[0] if models else platform.processor() or platform.machine(),
         "cores_usable": usable,
         "cores_used": 1,
+        "load_at_start": _load(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "versions": {name: _version(name) for name in ("openphase", *LIBRARIES)},
     }
+
+
+def _load() -> float | None:
+    """Processes that wanted a core during the last minute, where the system tells."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
 def _version(name: str) -> str | None:
@@ -150,6 +158,14 @@ def _print_machine(machine: Result) -> None:
     print(f"{machine['cores_used']} core used of {machine['cores_usable']} usable")
     known = [f"{name} {version}" for name, version in machine["versions"].items() if version]
     print(f"Python {machine['python']}; {', '.join(known)}\n")
+
+
+def _load_line(machine: Result) -> str:
+    start, end, cores = (machine[key] for key in ("load_at_start", "load_at_end", "cores_usable"))
+    if start is None or end is None:
+        return ""
+    busy = "; the machine was SHARED: trust ratios only" if max(start, end - 1.0) > cores else ""
+    return f"\nLoad of the machine: {start:.1f} before, {end:.1f} at the end (1 is this run){busy}"
 
 
 def _print_engine(engine: Result) -> None:

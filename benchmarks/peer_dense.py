@@ -16,7 +16,7 @@ TO_EARTH_S = 1e-14  #: holds what a break leaves connected to nothing
 def dense(problem: Problem) -> Callable[[], tuple[Complex, Complex]]:
     """Return what computes (B, 3, S) voltages before and after."""
     tree = problem.network.tree
-    series = np.linalg.inv(tree.z_ohm[: tree.parent.size])
+    series = np.linalg.inv(tree.z_ohm[: tree.parent.size]).astype(np.complex128)
     opened = _opened(tree.z_ohm[: tree.parent.size]) - series[:, None]
     intact = _intact(series, tree.parent)
 
@@ -53,8 +53,8 @@ def _intact(series: Complex, parent: np.ndarray) -> Complex:
             out[up, :, up] += y
             out[up, :, k] -= y
             out[k, :, up] -= y
-    out = out.reshape(3 * count, 3 * count)
-    return out + TO_EARTH_S * np.eye(3 * count)
+    square: Complex = out.reshape(3 * count, 3 * count)
+    return square + TO_EARTH_S * np.eye(3 * count)
 
 
 def _solve(
@@ -80,4 +80,5 @@ def _solve(
             blocks[each, a, :, b] += sign * change
     right = np.zeros((size, 3 * count, 1), np.complex128)
     right[:, :3, 0] = emf[:, None] * (edges[0] @ volts(problem.network))
-    return np.linalg.solve(y, right).reshape(size, count, 3).transpose(1, 2, 0)
+    v = np.linalg.solve(y, right).astype(np.complex128, copy=False)
+    return v.reshape(size, count, 3).transpose(1, 2, 0)

@@ -8,6 +8,7 @@ sequences 1 and 2 and another in sequence 0; peers get these two numbers ready-m
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,16 @@ from openphase.studies.run.classes import DrawClass, Purpose
 from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case
 from openphase.studies.run.spec import Study, default_study
 
-__all__ = ["Complex", "Problem", "draw_problem", "first", "paper_case", "shunts_of", "volts"]
+__all__ = [
+    "Complex",
+    "Problem",
+    "draw_problem",
+    "first",
+    "paper_case",
+    "pick",
+    "shunts_of",
+    "volts",
+]
 
 Complex = NDArray[np.complex128]
 Int = NDArray[np.int64]
@@ -69,7 +79,7 @@ def draw_problem(size: int) -> Problem:
     )
     drawn = draw_scenarios(case, which, size)
     order = np.argsort(drawn.event.edge, kind="stable")
-    before, after = (_pick(state, order) for state in (drawn.before, drawn.after))
+    before, after = (pick(state, order) for state in (drawn.before, drawn.after))
     everywhere = all_probes(case.network)
     answers = [solve(case.network, state, everywhere) for state in (before, after)]
     return Problem(
@@ -92,16 +102,18 @@ def first(problem: Problem, count: int) -> Problem:
     chosen = np.arange(0, size, max(size // count, 1))
     return replace(
         problem,
-        before=_pick(problem.before, chosen),
-        after=_pick(problem.after, chosen),
+        before=pick(problem.before, chosen),
+        after=pick(problem.after, chosen),
         shunt_s=(problem.shunt_s[0][..., chosen], problem.shunt_s[1][..., chosen]),
         v=(problem.v[0][..., chosen], problem.v[1][..., chosen]),
         sound=problem.sound[chosen],
     )
 
 
-def _pick(state: State, chosen: Int) -> State:
-    return State(*(np.ascontiguousarray(values[..., chosen]) for values in state))
+def pick(state: State, chosen: Int | slice) -> State:
+    """The chosen scenarios of a state."""
+    parts: list[Any] = [np.ascontiguousarray(values[..., chosen]) for values in state]
+    return State(*parts)
 
 
 def shunts_of(network: Network, load_scale: NDArray[np.float64]) -> Complex:
@@ -124,7 +136,7 @@ def shunts_of(network: Network, load_scale: NDArray[np.float64]) -> Complex:
     return out
 
 
-def volts(network: Network, emf_pu: float = 1.0) -> Complex:
-    """(3,) the EMF in volts."""
-    turn = np.exp(-2j * np.pi / 3)
-    return emf_pu * network.tree.v_nominal_v * np.array([1.0, turn, turn.conjugate()])
+def volts(network: Network) -> Complex:
+    """(3,) the EMF at 1 pu, in volts."""
+    out: Complex = network.tree.v_nominal_v * np.exp(-2j * np.pi / 3 * np.arange(3))
+    return out

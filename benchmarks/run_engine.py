@@ -10,7 +10,7 @@ import argparse
 import json
 import resource
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
@@ -34,7 +34,7 @@ class Stopwatch:
     """Time by part: always exactly one part runs, so the parts add up to the whole."""
 
     def __init__(self) -> None:
-        self.seconds: Counter[str] = Counter()
+        self.seconds: defaultdict[str, float] = defaultdict(float)
         self.passes: Counter[str] = Counter()
         self._part, self._since = "loop", perf_counter()
 
@@ -46,16 +46,21 @@ class Stopwatch:
         return left
 
     @contextmanager
-    def inside(self, module: ModuleType, name: str, parts: Callable[[], str]) -> Iterator[None]:
-        """Count every call of ``module.name`` as the part that ``parts()`` names."""
+    def inside(
+        self, module: ModuleType, name: str, part_of: Callable[[tuple[Any, ...]], str]
+    ) -> Iterator[None]:
+        """Count every call of ``module.name`` as the part that ``part_of`` names by its arguments.
+
+        Passes are summed over whole blocks only, not over what helps to start one.
+        """
         function = getattr(module, name)
 
         def timed(*args: Any, **named: Any) -> Any:
-            own = parts()
+            own = part_of(args)
             around = self.turn_to(own)
             result = function(*args, **named)
             self.turn_to(around)
-            if isinstance(result, Answer):
+            if isinstance(result, Answer) and result.passes.size == engine.BLOCK:
                 self.passes[own] += int(result.passes.sum())
             return result
 
@@ -79,11 +84,16 @@ def main() -> None:
 def _run(case: draw.Case, mix: list[draw.BlockId]) -> dict[str, Any]:
     count = len(mix) * engine.BLOCK
     watch = Stopwatch()
-    frames = iter(["solve before", "solve after"] * len(mix))
     trips = 0
+    scenarios: draw.Scenarios | None = None
+
+    def frame(args: tuple[Any, ...]) -> str:
+        is_after = scenarios is not None and args[1] is scenarios.after
+        return "solve after" if is_after else "solve before"
+
     with (
-        watch.inside(draw, "disc_noise", lambda: "noise"),
-        watch.inside(engine, "solve", lambda: next(frames)),
+        watch.inside(draw, "disc_noise", lambda _: "noise"),
+        watch.inside(engine, "solve", frame),
     ):
         start = perf_counter()
         for which in mix:

@@ -15,10 +15,9 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from problem import Complex, Problem, draw_problem, first
+from problem import Complex, Problem, draw_problem, first, pick
 
 from openphase.model.solve import solve
-from openphase.model.states import State
 from openphase.studies.run.engine import BLOCK
 
 SCENARIOS = 40_000
@@ -76,7 +75,7 @@ def main() -> None:
 def _product(problem: Problem) -> Callable[[], None]:
     """Both states of every scenario, block by block as a study solves them."""
     blocks = [
-        tuple(_part(state, slice(s, s + BLOCK)) for state, _ in problem.parts)
+        tuple(pick(state, slice(s, s + BLOCK)) for state, _ in problem.parts)
         for s in range(0, problem.sound.size, BLOCK)
     ]
 
@@ -86,10 +85,6 @@ def _product(problem: Problem) -> Callable[[], None]:
             solve(problem.network, after, problem.probes, start=start)
 
     return run
-
-
-def _part(state: State, part: slice) -> State:
-    return State(*(np.ascontiguousarray(values[..., part]) for values in state))
 
 
 def _row(peer: Peer, problem: Problem) -> dict[str, Any]:

@@ -203,9 +203,10 @@ def z_op_a_three_wire_approx(z_s_ohm: Complex, z_la_ohm: Complex) -> Complex:
     -----
     Eq. (8) is the loop of phase a in series with b and c in parallel, for balanced loads.
     Where nothing is connected between m and the break, and beyond it only what has no
-    zero-sequence path, the sound phases carry opposite currents. These drop nothing on the
-    mean of V_b and V_c, so m keeps E_a, the open conductor takes -E_a / 2, and eq. (5) is
-    exactly -1.5 V_n / I_q, before the break: again without the source's impedance.
+    zero-sequence path, the sound phases carry opposite currents afterwards. With Z1 = Z2
+    these induce nothing in phase a and cancel in the mean of V_b and V_c, so everywhere
+    beyond the break the open conductor takes -V_m,a' / 2, and eq. (5) is exactly
+    -(V_n + V_m / 2) / I_q, before the break: again without the source's impedance.
     """
     return -1.5 * (z_s_ohm + z_la_ohm)
 

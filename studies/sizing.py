@@ -10,7 +10,7 @@ import platform
 import sys
 import time
 from dataclasses import dataclass
-from importlib import metadata
+from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,11 @@ from ..model.errors import InputError, OpenPhaseError
 from ..model.feeder_file import dump_feeder, load_feeder
 from ..model.parts import Feeder
 from ..optimise.certificate import needed_trials, share_of_alpha
+from ..optimise.thresholds import Choice
 from .run.blocks import run_blocks
 from .run.certify import Validation, add_up, compared_rows, judged, section_row
 from .run.choose import Training, as_settings, choices, gather, more_blocks, planned_blocks
-from .run.classes import DrawClass, Purpose
+from .run.classes import Purpose
 from .run.draw import BlockId, Case, make_case
 from .run.engine import BLOCK
 from .run.ledger import attempt_number
@@ -33,7 +34,7 @@ from .run.tally import Tested, Trained, device_grid, judge_block, train_block
 from .show.report import write_report
 from .show.sheet import settings_csv, sheet_table
 
-__all__ = ["Sizing", "size_command", "size_feeder"]
+__all__ = ["Demand", "Sizing", "size_command", "size_feeder"]
 
 LONG_RUN_S = 600  #: longer runs ask for --yes
 
@@ -98,53 +99,38 @@ def exit_code(result: dict[str, Any]) -> int:
 
 
 def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizing:
-    """Train, choose, validate once, and write the run folder."""
-    started = time.perf_counter()
+    """Train, choose, validate once, and write the run folder ``out``.
+
+    Raises
+    ------
+    InputError
+        If feeder and study do not go together.
+    OpenPhaseError
+        If the folder cannot be used, or the run is long and ``demand.yes`` is not set.
+    """
     case = make_case(feeder, study)
     content = digest(dump_feeder(feeder), dump_study(study))
-    # the default number of scenarios depends on the attempt, which it also names: first try n = 1st
-    wanted = demand.scenarios or _default_scenarios(case, 1)
-    attempt = attempt_number(out.parent / "ledger.json", content, demand.seed, wanted)
+    # an attempt is entered under the size that was asked for, or that a first attempt needs
+    asked = demand.scenarios or _default_scenarios(case, 1)
+    attempt = attempt_number(out.parent / "ledger.json", content, demand.seed, asked)
     scenarios = demand.scenarios or _default_scenarios(case, attempt)
     folder = RunFolder(out)
-    folder_says = folder.open(_manifest(feeder, study, demand, scenarios, attempt))
-    if folder_says:
-        say(folder_says)
+    if news := folder.open(_manifest(feeder, study, demand, scenarios, attempt)):
+        say(news)
     folder.write("study.toml", dump_study(study))
-    train = planned_blocks(case, Purpose.TRAIN, demand.seed, attempt, scenarios)
-    _announce(case, train, scenarios, attempt, demand)
     folder.log(f"size {feeder.name}, seed {demand.seed}, attempt {attempt}, n {scenarios}")
-
+    watch = Watch()
+    train = planned_blocks(case, Purpose.TRAIN, demand.seed, attempt, scenarios)
+    _announce(case, folder, train, scenarios, demand)
     training = _train(case, train, folder, demand.jobs, scenarios)
-    trained = time.perf_counter()
-    grid = device_grid(case)
-    chosen = choices(case, grid, training)
-    reference = study.reference
-    paper = Settings(
-        i_set_a=reference.i_set_a,
-        v_set_pu=reference.v_set_pct / 100.0,
-        z_set_ohm=reference.z_set_ohm,
-        negative_sign=study.detector.negative_sign,
-    )
-    settings = tuple(
-        (
-            *(as_settings(case, choice) for choice in own),
-            None if terminal.load_side else paper,
-        )
-        for own, terminal in zip(chosen, case.points.terminals, strict=True)
-    )
-    picked = time.perf_counter()
+    watch.lap("train_s")
+    chosen = choices(case, device_grid(case), training)
+    watch.lap("choose_s")
     test = planned_blocks(case, Purpose.VALIDATE, demand.seed, attempt, scenarios)
+    settings = _compared_settings(case, chosen)
     validation = _validate(case, test, settings, folder, demand.jobs, scenarios)
-    validated = time.perf_counter()
-
-    sections, compared = [], []
-    for t, terminal in enumerate(case.points.terminals):
-        sections.append(section_row(case, t, chosen[t][0], validation, training.front[t], attempt))
-        if not terminal.load_side:
-            compared += compared_rows(case, t, settings[t], validation, attempt)
-    names = ("dead", "floating", "not_converged")
-    result = {
+    watch.lap("validate_s")
+    answer = {
         "version": __version__,
         "seed": demand.seed,
         "feeder": feeder.name,
@@ -152,26 +138,75 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
         "confidence": study.certificate.confidence,
         "attempt": attempt,
         "scenarios": scenarios,
-        "sections": sections,
-        "compared": compared,
+        **_certified(case, chosen, settings, training, validation, attempt),
+    }
+    sizing = Sizing(result=answer, case=case, training=training, validation=validation)
+    folder.write("result.json", as_json(answer))
+    folder.write("settings.csv", settings_csv(answer))
+    write_report(sizing.result, case, training.front, validation, folder)
+    watch.lap("report_s")
+    folder.write("timing.json", as_json(watch.laps))
+    return sizing
+
+
+class Watch:
+    """Laps of a run, in seconds."""
+
+    def __init__(self) -> None:
+        self.laps: dict[str, float] = {}
+        self._begun = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        """Note the time since the last lap."""
+        now = time.perf_counter()
+        self.laps[name], self._begun = round(now - self._begun, 3), now
+
+
+def _compared_settings(
+    case: Case, chosen: list[tuple[Choice | None, ...]]
+) -> tuple[tuple[Settings | None, ...], ...]:
+    """Per terminal the settings that are judged side by side, in the order of ``COMPARED``."""
+    reference = Settings(
+        i_set_a=case.study.reference.i_set_a,
+        v_set_pu=case.study.reference.v_set_pct / 100.0,
+        z_set_ohm=case.study.reference.z_set_ohm,
+        negative_sign=case.study.detector.negative_sign,
+    )
+    return tuple(
+        (*(as_settings(case, choice) for choice in own), None if terminal.load_side else reference)
+        for own, terminal in zip(chosen, case.points.terminals, strict=True)
+    )
+
+
+def _certified(
+    case: Case,
+    chosen: list[tuple[Choice | None, ...]],
+    settings: tuple[tuple[Settings | None, ...], ...],
+    training: Training,
+    validation: Validation,
+    attempt: int,
+) -> dict[str, Any]:
+    """The part of the answer that rests on the two samples."""
+    terminals = range(len(chosen))
+    return {
+        "sections": [
+            section_row(case, t, chosen[t][0], validation, training.front[t], attempt)
+            for t in terminals
+        ],
+        "compared": [
+            row
+            for t in terminals
+            if not case.points.terminals[t].load_side
+            for row in compared_rows(case, t, settings[t], validation, attempt)
+        ],
         "feeder_false_trips": {
             "per_year_upper": None,
             "assumptions": "not built yet: event classes have no rates per year",
         },
-        "numerics": dict(zip(names, validation.flags.tolist(), strict=True)),
+        "numerics": dict(
+            zip(("dead", "floating", "not_converged"), validation.flags.tolist(), strict=True)
+        ),
     }
-    sizing = Sizing(result=result, case=case, training=training, validation=validation)
-    folder.write("result.json", as_json(result))
-    folder.write("settings.csv", settings_csv(result))
-    write_report(sizing.result, case, training.front, validation, folder)
-    timing = {
-        "train_s": trained - started,
-        "choose_s": picked - trained,
-        "validate_s": validated - picked,
-        "report_s": time.perf_counter() - validated,
-    }
-    folder.write("timing.json", as_json({key: round(s, 3) for key, s in timing.items()}))
-    return sizing
 
 
 def _train(
@@ -215,28 +250,23 @@ def _default_scenarios(case: Case, attempt: int) -> int:
 
 
 def _announce(
-    case: Case, train: list[BlockId], scenarios: int, attempt: int, demand: Demand
+    case: Case, folder: RunFolder, train: list[BlockId], scenarios: int, demand: Demand
 ) -> None:
     """Say how much there is to do and how long it takes; ask for --yes where that is long."""
     say(
         f"{case.feeder.name}: {len(case.points.terminals)} terminals, "
         f"{judged(case.points.terminals)} to judge; {scenarios:,} scenarios per class and side "
-        f"at least, attempt {attempt}; compiling the solver at first use …"
+        f"at least, attempt {train[0].attempt}"
     )
-    first = BlockId(
-        seed=demand.seed,
-        purpose=Purpose.TRAIN,
-        attempt=attempt,
-        drawn=DrawClass.OPEN_PHASE,
-        block=0,
-    )
-    train_block(case, first, 10)
+    left = max(2 * len(train) - folder.count_blocks(), 0)
+    if not left:
+        return
+    say("compiling the solver, at first use …")
+    train_block(case, train[0], 10)
     begun = time.perf_counter()
-    train_block(case, first, 500)
-    each = (time.perf_counter() - begun) / 500
-    total = 2 * len(train) * BLOCK
-    seconds = total * each / demand.jobs
-    say(f"{total:,} scenarios in all, about {_span(seconds)} on {demand.jobs} processes")
+    train_block(case, train[0], BLOCK)
+    seconds = (time.perf_counter() - begun) * left / demand.jobs
+    say(f"{left * BLOCK:,} scenarios to draw, about {_span(seconds)} on {demand.jobs} processes")
     if seconds > LONG_RUN_S and not demand.yes:
         raise OpenPhaseError(
             f"this takes about {_span(seconds)}: add --yes to start it, or --scenarios for fewer"
@@ -252,6 +282,15 @@ def digest(*texts: str) -> str:
     return hashlib.sha256("\0".join(texts).encode("utf-8")).hexdigest()
 
 
+def code_digest() -> str:
+    """SHA-256 of the package's sources: blocks of one code are never mixed with another's."""
+    root = resources.files(__package__.partition(".")[0])
+    with resources.as_file(root) as folder:
+        rooms = ("model", "detector", "optimise", "studies")
+        files = sorted(path for room in rooms for path in (folder / room).rglob("*.py"))
+        return digest(*(path.read_text(encoding="utf-8") for path in files))
+
+
 def _manifest(
     feeder: Feeder, study: Study, demand: Demand, scenarios: int, attempt: int
 ) -> dict[str, object]:
@@ -260,6 +299,7 @@ def _manifest(
     return {
         "command": ["size", feeder.name, "--seed", demand.seed, "--scenarios", scenarios],
         "openphase": __version__,
+        "code_sha256": code_digest(),
         "python": platform.python_version(),
         "libraries": {name: metadata.version(name) for name in libraries},
         "feeder_sha256": digest(dump_feeder(feeder)),

@@ -97,7 +97,7 @@ class RunFolder:
         try:
             if known.exists():
                 if known.read_text(encoding="utf-8") == text:
-                    blocks = len(list(self.blocks.glob("*.npz")))
+                    blocks = self.count_blocks()
                     return f"{self.path}: resuming, {blocks} blocks are there" if blocks else None
                 said = f"{self.path}: inputs have changed since the last run; starting afresh"
                 self._empty()
@@ -109,6 +109,10 @@ class RunFolder:
             raise OpenPhaseError(f"{self.path}: {error.strerror or error}") from error
         self.write("manifest.json", text)
         return said
+
+    def count_blocks(self) -> int:
+        """How many blocks are stored."""
+        return len(list(self.blocks.glob("*.npz")))
 
     def _empty(self) -> None:
         for file in self.blocks.glob("*.npz*"):

@@ -10,7 +10,7 @@ from ...model.topology import Tree, edges, forest, tree_path
 
 __all__ = ["FeederLayout", "Mark", "Tie", "Wire", "lay_out"]
 
-GAP = 0.012  #: of the feeder's reach, between a bus and the mark of a point at it
+GAP = 0.018  #: of the feeder's reach, between a bus and the mark of a point at it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,7 +166,8 @@ def _units(
     def stands(place: Place) -> tuple[float, int]:
         if place.bus is not None:
             return km[place.bus], row[place.bus]
-        assert place.line is not None and place.at is not None
+        assert place.line is not None
+        assert place.at is not None
         wire = by_line[place.line]
         near_is_from = km[from_bus[place.line]] == wire.start_km
         share = place.at if near_is_from else 1.0 - place.at

@@ -1,21 +1,9 @@
-"""Pictures: each takes data and draws it; none computes, and none opens a window.
-
-Figures are built without pyplot and saved without dates or versions, so that equal data
-give equal bytes.
-"""
+"""Pictures: each takes data and draws it; none computes, and none opens a window."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import IO, Any, TypeVar
-
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
@@ -23,10 +11,10 @@ from numpy.typing import NDArray
 
 from ...model.parts import Feeder
 from .feeder_layout import FeederLayout, Mark, Tie, lay_out
-from .views import Bar, EvidenceView, OverviewView, ProfileView
+from .figures import TALLEST, axes_or_new, house_style, png_of, save_figure, save_png
+from .views import Bar, Cloud, EvidenceView, OverviewView, ProfileView
 
 __all__ = [
-    "house_style",
     "plot_evidence",
     "plot_feeder",
     "plot_overview",
@@ -36,26 +24,7 @@ __all__ = [
     "save_png",
 ]
 
-T = TypeVar("T")
 Real = NDArray[np.float64]
-
-DPI = 120
-
-STYLE: dict[str, Any] = {
-    "font.family": "DejaVu Sans",  # ships with matplotlib
-    "font.size": 9.5,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "svg.hashsalt": "openphase",
-    "text.parse_math": False,  # a name may hold a dollar sign
-}
 
 # Okabe and Ito's colours, which the colour-blind tell apart
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
@@ -74,70 +43,13 @@ SECTION_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
 CROWDED = 24  #: units beyond which a schematic shows their names only
 
 
-# ---- figures ----
-
-
-@contextmanager
-def house_style() -> Iterator[None]:
-    """Draw in the project's style, whatever the user's matplotlibrc says."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        yield
-
-
-def save_png(figure: Figure | SubFigure | None, target: Path | IO[bytes]) -> None:
-    """Write a figure as PNG: equal figures give equal bytes."""
-    _save(figure, target, "png", {"Software": None})
-
-
-def save_figure(figure: Figure | SubFigure | None, path: Path) -> None:
-    """Write a figure as PNG or SVG, as the file's name says.
-
-    Raises ValueError for any other ending.
-    """
-    if path.suffix.lower() == ".svg":
-        _save(figure, path, "svg", {"Date": None, "Creator": None})
-    elif path.suffix.lower() == ".png":
-        save_png(figure, path)
-    else:
-        raise ValueError(f"must end in .png or .svg, got '{path.suffix}'")
-
-
-def _save(
-    figure: Figure | SubFigure | None,
-    target: Path | IO[bytes],
-    form: str,
-    metadata: dict[str, str | None],
-) -> None:
-    if not isinstance(figure, Figure):
-        raise TypeError(f"must be a whole figure, got {type(figure).__name__}")
-    with house_style():
-        figure.savefig(target, format=form, dpi=DPI, metadata=metadata, facecolor="white")
-
-
-def png_of(plot: Callable[[T], Axes], data: T) -> bytes:
-    """The picture that ``plot`` makes of ``data``, in the project's style."""
-    buffer = io.BytesIO()
-    with house_style():
-        save_png(plot(data).get_figure(), buffer)
-    return buffer.getvalue()
-
-
-def _axes(ax: Axes | None, width: float, height: float) -> Axes:
-    """``ax``, or the axes of a new figure of this size in inches."""
-    if ax is not None:
-        return ax
-    with house_style():
-        return Figure(figsize=(width, height), layout="constrained").add_subplot()
-
-
 # ---- evidence ----
 
 
+@house_style()
 def plot_evidence(view: EvidenceView, ax: Axes | None = None) -> Axes:
     """Draw a terminal's events in the plane of |ΔI1| and |Z1|, and the settings among them."""
-    ax = _axes(ax, 8.6, 7.4)
+    ax = axes_or_new(ax, 8.6, 7.4)
     low = np.array([view.limits_a[0], view.limits_ohm[0]])
     high = np.array([view.limits_a[1], view.limits_ohm[1]])
     ax.set(xscale="log", yscale="log", xlim=view.limits_a, ylim=view.limits_ohm)
@@ -152,16 +64,16 @@ def plot_evidence(view: EvidenceView, ax: Axes | None = None) -> Axes:
     ax.set_ylabel("|Z1| and Z_set [Ω]")
     sign = "Re Z1 < 0 and " if view.negative_sign else ""
     ax.set_title(
-        f"{view.terminal}: validation events (a sample of them) at V_set {_percent(view.v_set_pu)}"
-        f"\nfull colour: {sign}|ΔV1| ≤ V_set, so every setting to its lower left trips; "
-        "faint: cannot trip",
+        f"{view.terminal}: a sample of the validation events, judged at V_set "
+        f"{_percent(view.v_set_pu)}\nfull colour: {sign}|ΔV1| ≤ V_set, trips every setting to its "
+        "lower left; faint: cannot trip; on the frame: beyond",
         fontsize=9.5,
     )
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2)
     return ax
 
 
-def _draw_cloud(ax: Axes, cloud: Any, low: Real, high: Real) -> Line2D:
+def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch:
     """Draw one class; what cannot trip is faint and hollow. Returns its legend entry."""
     text, colour, marker = CLASSES[cloud.name, cloud.side]
     must_trip = cloud.name == "open_inside"
@@ -287,16 +199,15 @@ def _draw_settings(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
 # ---- dependability ----
 
 
+@house_style()
 def plot_profile(view: ProfileView, ax: Axes | None = None) -> Axes:
     """Draw the share of breaks that a terminal finds, along its section."""
-    ax = _axes(ax, 8.6, 3.9)
+    ax = axes_or_new(ax, 8.6, 3.9)
     x = view.edges_km
     ax.stairs(view.high, x, baseline=view.low, fill=True, color=SKY, alpha=0.4, lw=0)
     ax.stairs(view.share, x, baseline=None, color=BLUE, lw=1.6)
     for start, stop in view.blind_km:
-        ax.axvspan(
-            start, stop, facecolor="#eeeeee", edgecolor="#bbbbbb", hatch="//", lw=0, zorder=0
-        )
+        ax.axvspan(start, stop, facecolor="#ededed", lw=0, zorder=0)
     for km, text in view.tees:
         ax.plot([km, km], [1.03, 1.1], color=GREY, lw=1.0, clip_on=False)
         ax.text(km, 1.12, text, ha="center", va="bottom", fontsize=8, color="#444444")
@@ -316,14 +227,7 @@ def plot_profile(view: ProfileView, ax: Axes | None = None) -> Axes:
         Patch(color=SKY, alpha=0.4, label=f"{view.confidence:.0%} interval of each stretch"),
     ]
     if view.blind_km:
-        handles.append(
-            Patch(
-                facecolor="#eeeeee",
-                edgecolor="#bbbbbb",
-                hatch="//",
-                label="nothing connected beyond: not to be seen",
-            )
-        )
+        handles.append(Patch(facecolor="#ededed", label="nothing connected beyond: cannot be seen"))
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
     return ax
 
@@ -331,9 +235,10 @@ def plot_profile(view: ProfileView, ax: Axes | None = None) -> Axes:
 OVERVIEW = ((BLUE, ""), (SKY, ""), ("#bdbdbd", "///"))  #: colour and hatch of each setting
 
 
+@house_style()
 def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
     """Draw the dependability of the compared settings of every judged terminal."""
-    ax = _axes(ax, 8.6, 1.5 + 0.95 * len(view.terminals))
+    ax = axes_or_new(ax, 8.6, 1.5 + min(0.95 * len(view.terminals), TALLEST))
     step = 0.27
     for t, bars in enumerate(view.bars):
         for n, bar in enumerate(bars):
@@ -349,7 +254,8 @@ def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
         Patch(facecolor=colour, edgecolor="white", hatch=hatch, label=name)
         for name, (colour, hatch) in zip(view.names, OVERVIEW, strict=True)
     ]
-    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.55 / (len(bars) * 1.0)))
+    below = -0.55 / (0.95 * len(view.terminals))
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, below), ncols=3)
     return ax
 
 
@@ -380,15 +286,18 @@ def _percent(pu: float) -> str:
 # ---- the feeder ----
 
 
+@house_style()
 def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
     """Draw a schematic of a feeder: km from the source, one row for each branch."""
     layout = lay_out(feeder)
-    ax = _axes(ax, 11.0, 1.6 + 1.35 * layout.rows)
+    crowded = len(layout.units) > CROWDED
+    row_height = 0.7 if crowded else 1.35
+    ax = axes_or_new(ax, 11.0, 1.6 + min(row_height * layout.rows, TALLEST))
     _draw_wires(ax, layout)
     for tie in layout.ties:
         _draw_tie(ax, tie, layout.reach_km)
     for unit in layout.units:
-        _draw_unit(ax, unit, len(layout.units) > CROWDED)
+        _draw_unit(ax, unit, crowded)
     for point in layout.points:
         ax.plot(
             point.km,
@@ -409,10 +318,7 @@ def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
     ax.spines["left"].set_visible(False)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlabel("distance from the source along the line [km]")
-    ax.set_title(
-        f"{layout.name}: {len(feeder.lines)} lines, {len(feeder.points)} measuring points, "
-        f"{len(feeder.sections)} sections"
-    )
+    ax.set_title(f"{layout.name}: {len(feeder.lines)} lines, {len(feeder.points)} measuring points")
     handles = [
         Line2D([], [], color=SECTION_COLOURS[n % 6], lw=4, label=f"section {name}")
         for n, name in enumerate(layout.sections)
@@ -421,7 +327,7 @@ def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
         Line2D(
             [], [], ls="", marker="o", color="white", mec="black", ms=7, label="measuring point"
         ),
-        Line2D([], [], ls="", marker="v", color="black", ms=6, label="transformer or load"),
+        Line2D([], [], ls="", marker="^", color="black", ms=6, label="transformer or load"),
         Line2D([], [], ls="--", marker="s", color="black", mfc="white", ms=7, label="open switch"),
     ]
     ax.legend(
@@ -432,9 +338,9 @@ def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
 
 def _draw_wires(ax: Axes, layout: FeederLayout) -> None:
     for wire in layout.wires:
-        x, y = [wire.start_km, wire.start_km, wire.stop_km], [wire.from_row, wire.row, wire.row]
+        x, y = [wire.start_km, wire.stop_km], [wire.row, wire.row]
+        ax.plot([x[0], x[0]], [wire.from_row, wire.row], color="black", lw=1.2, zorder=0.9)
         if not wire.is_line:
-            ax.plot(x, y, color="black", lw=1.2, zorder=1)
             ax.plot(wire.stop_km, wire.row, "s", color="black", ms=6, zorder=3)
             continue
         if not wire.sections:
@@ -443,7 +349,7 @@ def _draw_wires(ax: Axes, layout: FeederLayout) -> None:
         for n, section in enumerate(wire.sections):
             colour = SECTION_COLOURS[section % len(SECTION_COLOURS)]
             width = 5.0 * (1.0 - n / len(wire.sections))
-            ax.plot(x, y, color=colour, lw=width, solid_joinstyle="miter", zorder=1 + 0.01 * n)
+            ax.plot(x, y, color=colour, lw=width, solid_capstyle="butt", zorder=1 + 0.01 * n)
 
 
 def _draw_tie(ax: Axes, tie: Tie, reach_km: float) -> None:

@@ -1,8 +1,381 @@
-"""placeholder written next."""
+"""The report of a sizing: one static page with its pictures in it, and the pictures as files."""
 
 from __future__ import annotations
 
+import re
+from html import escape
 from typing import Any
 
+from ...detector.criteria import Reason
+from ...optimise.staircase import Front
+from ..run.certify import Validation
+from ..run.draw import Case
+from ..run.spec import Study
+from ..run.store import RunFolder
+from .html_parts import (
+    bound_text,
+    bullets,
+    class_trips_cell,
+    dependability_text,
+    ends,
+    false_trips_cell,
+    interval_text,
+    k_of_n,
+    margin_text,
+    number_cell,
+    percent,
+    picture,
+    range_text,
+    right_cell,
+    table,
+    terminal_name,
+)
+from .views import evidence_view, overview_view, profile_view
 
-def write_report(*args: Any) -> None: ...
+__all__ = ["report_html", "write_report"]
+
+STATUS = {
+    "set": "no false trip in validation, the bound is within the target, and the terminal surely "
+    "finds at least {find:.0%} of the breaks that have something connected beyond them",
+    "weak": "no false trip and the bound is within the target, but it finds less than that",
+    "none": "no setting that the device can hold keeps the demanded margin of {margin:g}",
+    "not_certified": "validation showed a false trip, or was too small for the target",
+    "load_side": "cut off with its section, this terminal has no source behind it: no settings; "
+    "the other end of the section decides",
+}
+"""Status -> what it means."""
+
+CLASSES = {
+    "open_inside": "open phase on the section's path",
+    "load_step": "load step",
+    "source_step": "source voltage step",
+    "open_outside": "open phase elsewhere",
+    "open_lateral": "open phase on a lateral of the section",
+    "open_three": "three phases open",
+}
+KINDS = {"must_trip": "must trip", "must_not_trip": "must not trip", "apart": "in neither count"}
+
+NOT_BUILT = (
+    "Only the classes listed per terminal are drawn. Faults with intact conductors, regulator "
+    "taps, capacitor and motor switching, tie switching and transfer, PV, energisation and "
+    "reclosing are not: the bounds say nothing about them.",
+    "Ratio and angle errors of CTs and VTs, and clock errors, are not drawn: only the random "
+    "error stated above.",
+    "Rare false trips are sampled, not hunted.",
+    "ΔT and the operate delay are carried in the sheet, and not judged: one frame before the "
+    "event and one after it stand for all.",
+    "Event classes have no rates, so there are no false trips per year.",
+    "One setting group; each study has one state of its switches.",
+)
+
+STYLE = """\
+body { font: 15px/1.45 "DejaVu Sans", Verdana, sans-serif; color: #1b1b1b; background: #fff;
+  max-width: 1080px; margin: 2em auto; padding: 0 1em; }
+h1 { font-size: 1.6em; margin-bottom: .2em; }
+h2 { font-size: 1.25em; margin-top: 2em; border-bottom: 1px solid #ccc; }
+h3 { font-size: 1.05em; margin: 1.4em 0 .4em; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .82em; margin: .6em 0; }
+th, td { padding: .3em .6em; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top; }
+thead th { border-bottom: 2px solid #888; }
+.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.w { white-space: nowrap; }
+.sheet tbody tr:nth-child(odd) > * { border-bottom: none; padding-bottom: 0; }
+.sheet tbody tr:nth-child(even) > * { color: #555; }
+.bad { color: #a33b00; font-weight: bold; }
+.faint, figcaption, footer { color: #555; font-size: .85em; }
+figure { margin: 1em 0; break-inside: avoid; }
+img { max-width: 100%; height: auto; }
+dt { font-weight: bold; float: left; clear: left; width: 8.5em; }
+dd { margin: 0 0 .3em 9em; }
+@media print { body { font-size: 10pt; margin: 0; max-width: none; } .wide { overflow: visible; }
+  img { max-height: 12.5cm; }
+  section.terminal { break-before: page; } tr, h2, h3 { break-inside: avoid; break-after: auto; } }
+"""
+
+
+def write_report(
+    result: dict[str, Any],
+    case: Case,
+    fronts: tuple[Front, ...],
+    validation: Validation,
+    folder: RunFolder,
+) -> None:
+    """Draw the pictures of a finished sizing and write them and ``report.html``.
+
+    Parameters
+    ----------
+    result
+        What ``size --json`` prints.
+    case
+        The feeder and study.
+    fronts
+        Per terminal, the training events that no other outdoes.
+    validation
+        The validation sample.
+    folder
+        Where the report goes.
+    """
+    # matplotlib takes half a second to import: only a run that got here pays for it
+    from .plots import plot_evidence, plot_feeder, plot_overview, plot_profile, png_of  # noqa: PLC0415
+
+    pictures = {"feeder.png": png_of(plot_feeder, case.feeder)}
+    if result["compared"]:
+        pictures["overview.png"] = png_of(plot_overview, overview_view(result))
+    for t, row in enumerate(result["sections"]):
+        if row["classes"]:
+            evidence, profile = _picture_names(t, row)
+            view = evidence_view(case, t, row, fronts[t], validation)
+            pictures[evidence] = png_of(plot_evidence, view)
+            pictures[profile] = png_of(plot_profile, profile_view(case, t, validation))
+    for name, png in pictures.items():
+        folder.write(name, png)
+    folder.write("report.html", report_html(result, case.study, pictures))
+
+
+def _picture_names(t: int, row: dict[str, Any]) -> tuple[str, str]:
+    """Files of a terminal's two pictures; the number keeps them apart whatever the names are."""
+    stem = re.sub(r"[^A-Za-z0-9]+", "-", f"{row['local']}-{row['remote']}").strip("-")
+    return f"{t + 1:02d}-{stem}-evidence.png", f"{t + 1:02d}-{stem}-along-line.png"
+
+
+def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]) -> str:
+    """The page; ``pictures`` are embedded by their names."""
+    title = f"Open-phase settings for feeder {result['feeder']}"
+    parts = [
+        f"<h1>{escape(title)}</h1>",
+        _head(result, study),
+        "<h2>Settings sheet</h2>",
+        _sheet(result),
+        picture("feeder.png", "schematic of the feeder", "The feeder and its sections.", pictures),
+        _comparison(result, pictures),
+        *(
+            _terminal(t, row, study, pictures)
+            for t, row in enumerate(result["sections"])
+            if row["classes"]
+        ),
+        _assumptions(result, study),
+        f"<footer><p>openphase {escape(result['version'])}; inputs, versions and hashes are in "
+        "manifest.json, every default in study.toml, all numbers in result.json.</p></footer>",
+    ]
+    body = "\n".join(part for part in parts if part)
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f"<title>{escape(title)}</title>\n<style>\n{STYLE}</style>\n</head>\n"
+        f"<body>\n{body}\n</body>\n</html>\n"
+    )
+
+
+# ---- parts of the page ----
+
+
+def _head(result: dict[str, Any], study: Study) -> str:
+    demand = study.certificate
+    known = {"find": demand.find_at_least, "margin": demand.margin}
+    words = "\n".join(
+        f"<dt>{status}</dt><dd>{escape(text.format(**known))}{_tally(result, status)}</dd>"
+        for status, text in STATUS.items()
+    )
+    return (
+        f"<p>Seed {result['seed']}, attempt {result['attempt']}, at least "
+        f"{result['scenarios']:,} scenarios of every class and side. All bounds hold together at "
+        f"{percent(result['confidence'], 0)} confidence, over all terminals and attempts; the "
+        f"target is at most {bound_text(demand.target)} false trips per event.</p>\n"
+        f"<h3>What the status words mean</h3>\n<dl>\n{words}\n</dl>"
+    )
+
+
+def _tally(result: dict[str, Any], status: str) -> str:
+    count = sum(row["status"] == status for row in result["sections"])
+    return f' <span class="faint">(here: {count})</span>'
+
+
+def _sheet(result: dict[str, Any]) -> str:
+    head = (
+        "terminal", "status", "#I_set A", "#V_set %", "#Z_set Ω", "#margin",
+        "#dependability (interval)", "#unreachable", "#false trips", "#bound",
+    )  # fmt: skip
+    rows = []
+    for row in result["sections"]:
+        cells = [
+            f'<th class="w">{terminal_name(row)}</th>',
+            f'<td class="w">{escape(row["status"])}</td>',
+        ]
+        cells += [
+            number_cell(row["i_set_a"], "{:.1f}"),
+            number_cell(row["v_set_pu"], "{:.1f}", 100.0),
+            number_cell(row["z_set_ohm"], "{:.1f}"),
+            right_cell(margin_text(row)),
+            right_cell(dependability_text(row)),
+            right_cell(k_of_n(row["unreachable"], row["opens"])),
+            false_trips_cell(row["false_trips"], row["security_trials"]),
+            right_cell(bound_text(row["false_trip_upper"])),
+        ]
+        rows += ["".join(cells), f'<td></td><td colspan="9">{escape(row["reason"])}</td>']
+    return table(head, rows, "sheet") + (
+        '<p class="faint">Dependability: breaks found, of those with something connected beyond '
+        "them; the unreachable ones have nothing beyond, and change nothing to be measured. "
+        "False trips: k of n events that must not trip. Bound: upper bound of the false-trip "
+        "probability per event, worst class. Margin: factor by which I_set and Z_set could be "
+        "lowered and V_set raised together before the first false trip in training.</p>"
+    )
+
+
+def _comparison(result: dict[str, Any], pictures: dict[str, bytes]) -> str:
+    if not result["compared"]:
+        return ""
+    head = (
+        "terminal", "setting", "#I_set A", "#V_set %", "#Z_set Ω", "#found", "#interval",
+        "#false trips", "#bound",
+    )  # fmt: skip
+    rows = []
+    for row in result["compared"]:
+        low, high = row["dependability_low"], row["dependability_high"]
+        cells = [
+            f'<th class="w">{terminal_name(row)}</th>',
+            f'<td class="w">{escape(row["name"])}</td>',
+        ]
+        cells += [
+            number_cell(row["i_set_a"], "{:.1f}"),
+            number_cell(row["v_set_pu"], "{:.1f}", 100.0),
+            number_cell(row["z_set_ohm"], "{:.1f}"),
+            right_cell(k_of_n(row["detected"], row["opens"])),
+            right_cell("–" if low is None else interval_text(low, high)),
+            false_trips_cell(row["false_trips"], row["trials"]),
+            right_cell(bound_text(row["upper"])),
+        ]
+        rows.append("".join(cells))
+    return (
+        "<h2>Chosen settings beside others</h2>\n<p>All on the same validation sample: the chosen "
+        "setting, the best one at the reference's V_set, and the reference.</p>\n"
+        + table(head, rows)
+        + picture("overview.png", "dependability and false trips of every terminal", "", pictures)
+    )
+
+
+def _terminal(t: int, row: dict[str, Any], study: Study, pictures: dict[str, bytes]) -> str:
+    evidence, profile = _picture_names(t, row)
+    head = ("class", "side", "kind", "#trials", "#effective trials", "#trips", "#upper bound")
+    rows = [
+        "".join(
+            [
+                f"<td>{escape(CLASSES.get(own['name'], own['name']))}</td>",
+                f'<td>{escape(own["side"])}</td><td class="w">{KINDS[own["kind"]]}</td>',
+                right_cell(f"{own['trials']:,}"),
+                right_cell(k_of_n(own["effective_trials"], own["trials"])),
+                class_trips_cell(own),
+                # a bound of trips is a merit of security, and says nothing of what must trip
+                right_cell(bound_text(own["upper"]) if own["kind"] != "must_trip" else "–"),
+            ]
+        )
+        for own in row["classes"]
+    ]
+    z1 = complex(*row["line_z1_ohm"])
+    return "\n".join(
+        [
+            '<section class="terminal">',
+            f"<h2>Terminal {terminal_name(row)}: {escape(row['status'])}</h2>",
+            f"<p>{_setting(row)} Line between the points: |Z1| = {abs(z1):.2f} Ω.</p>",
+            f"<p>{escape(row['reason'][:1].upper() + row['reason'][1:])}.</p>",
+            table(head, rows),
+            '<p class="faint">Effective trials come near the thresholds: |ΔI1| > I_set/2 and '
+            "|ΔV1| ≤ V_set. Where they are few, no trips show little.</p>",
+            _causes(row, study),
+            _nearest(row),
+            picture(
+                evidence,
+                f"evidence of {row['local']} to {row['remote']}",
+                "Each mark is one event of the validation sample. Whatever is in full colour "
+                "trips every setting to its lower left. The brown region is built from all of the "
+                "training sample: a setting in it trips falsely there. A setting beyond the dashed "
+                "line keeps the demanded margin, in V_set as well.",
+                pictures,
+            ),
+            picture(
+                profile,
+                f"breaks found along {row['local']} to {row['remote']}",
+                "Found, of all internal breaks of the validation sample in each stretch; ticks "
+                "above: transformers and loads.",
+                pictures,
+            ),
+            "</section>",
+        ]
+    )
+
+
+def _setting(row: dict[str, Any]) -> str:
+    if row["i_set_a"] is None:
+        return "No setting."
+    return (
+        f"I_set {row['i_set_a']:g} A ({row['i_set_pu']:g} pu), V_set {row['v_set_pu'] * 100:g} %, "
+        f"Z_set {row['z_set_ohm']:g} Ω, margin {margin_text(row)}."
+    )
+
+
+def _causes(row: dict[str, Any], study: Study) -> str:
+    if row["detected"] is None:
+        return ""
+    missed = row["opens"] - row["unreachable"] - row["detected"]
+    begin = f"<p><b>Missed breaks</b> (with something connected beyond): {missed:,}"
+    if not row["causes"]:
+        return f"{begin}.</p>"
+    found = [
+        f"{percent(cause['share'])} {escape(Reason[cause['criterion'].upper()].text)}"
+        for cause in row["causes"]
+    ]
+    sign = "" if study.detector.negative_sign else " (the sign is not used)"
+    return f"{begin}; the first criterion that failed{sign}: {'; '.join(found)}.</p>"
+
+
+def _nearest(row: dict[str, Any]) -> str:
+    near = row["nearest_false_trip"]
+    if near is None:
+        return ""
+    name = CLASSES.get(near["class"], near["class"].replace("_", " "))
+    return (
+        f"<p><b>Nearest false trip</b> in training: {escape(name)}, at factor "
+        f"{near['factor']:.2f}; scenario <code>{escape(near['scenario'])}</code>.</p>"
+    )
+
+
+def _assumptions(result: dict[str, Any], study: Study) -> str:
+    loads, step, noise = study.loads, study.load_step, study.instruments
+    transformers = study.transformers
+    units = ", ".join(transformers.yg_d) or "none"
+    closed = study.network.closed
+    switches = (
+        "as in the feeder file"
+        if closed is None
+        else f"closed: {', '.join(closed) or 'none'}; all others open"
+    )
+    numerics = result["numerics"]
+    stated = [
+        f"Noise: each phasor of V and I, per phase and frame, has a complex random error, normal "
+        f"with a standard deviation of a third of its bound per axis, truncated at the bound: TVE "
+        f"{noise.tve_pct:g} % of the phasor, for currents at least {noise.current_floor_a:g} A.",
+        f"Loads: common level {range_text(loads.level)} times {range_text(loads.each)} for each; "
+        f"voltage exponent {range_text(loads.exponent)} common to all, each within "
+        f"±{loads.exponent_spread:g} of it; constant impedance below 0.7 pu.",
+        f"Transformers that may be Yg/D, in this order: {units}; how many: "
+        f"{transformers.yg_d_count[0]} to {transformers.yg_d_count[1]}.",
+        f"Switches: {switches}.",
+        f"Between the two frames every scenario also has a source change within "
+        f"±{study.ambient.source_pct:g} % and a change of each load within "
+        f"±{study.ambient.load_pct:g} %.",
+        f"Load steps: {range_text(step.kw)} kW on or off, {percent(step.single_phase_share, 0)} of "
+        f"them single-phase. Source steps: {range_text(study.source_step.pct)} %. Breaks: uniform "
+        f"in length, {percent(study.open_phase.two_phase_share, 0)} of them two phases, else one.",
+        f"Device: I_set {range_text(ends(study.device.i_grid()))} A, Z_set "
+        f"{range_text(ends(study.device.z_grid()))} Ω, V_set "
+        f"{', '.join(f'{v:g}' for v in study.device.v_set_pct)} %; sign of Re Z1 "
+        f"{'used' if study.detector.negative_sign else 'not used'}.",
+    ]
+    solved = (
+        "Numerics: what an opened conductor leads to is dead (nothing connected, or no source) in "
+        f"{numerics['dead']:,} validation scenarios and floating in {numerics['floating']:,}; "
+        f"{numerics['not_converged']:,} did not converge."
+    )
+    return (
+        "<h2>Assumptions</h2>\n<p>The bounds hold for events drawn as follows, and for no "
+        f"others.</p>\n{bullets([*stated, solved])}\n<h3>Not built yet</h3>\n{bullets(NOT_BUILT)}"
+    )

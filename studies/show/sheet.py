@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import textwrap
 from typing import Any
 
 __all__ = ["settings_csv", "sheet_table"]
@@ -24,51 +25,67 @@ def settings_csv(result: dict[str, Any]) -> str:
 
 def sheet_table(result: dict[str, Any]) -> str:
     """The sheet in at most 100 columns, and the comparison under it."""
-    confidence = result["confidence"]
+    wide = max(8, *(len(_name(row)) for row in result["sections"])) + 2
     lines = [
         f"{result['feeder']}: settings, seed {result['seed']}, attempt {result['attempt']}; "
-        f"all bounds together at {confidence:.0%} confidence",
+        f"all bounds together at {result['confidence']:.0%} confidence",
         "",
-        f"{'terminal':<10}{'status':<15}{'I_set A':>8}{'V_set %':>8}{'Z_set Ω':>8}{'margin':>8}"
-        f"{'found':>16}{'false trips':>15}{'bound':>9}",
+        f"{'terminal':<{wide}}{'status':<14}{'I_set A':>8}{'V_set %':>8}{'Z_set Ω':>8}{'margin':>8}"
+        f"{'found':>16}{'false trips':>16}{'bound':>9}",
     ]
-    for row in result["sections"]:
-        name = f"{row['local']}→{row['remote']}"
-        if row["i_set_a"] is None:
-            lines.append(f"{name:<10}{row['status']:<15}{row['reason'][:75]}")
-            continue
-        lines.append(
-            f"{name:<10}{row['status']:<15}{row['i_set_a']:>8.1f}{row['v_set_pu'] * 100:>8.1f}"
-            f"{row['z_set_ohm']:>8.1f}{_margin(row['margin']):>8}"
-            f"{_share(row['detected'], row['opens'] - row['unreachable']):>16}"
-            f"{_of(row['false_trips'], row['security_trials']):>15}"
-            f"{row['false_trip_upper']:>9.1e}"
-        )
+    lines += [_setting_row(row, wide) for row in result["sections"]]
+    blind = ", ".join(
+        f"{_name(row)} {row['unreachable']} of {row['opens']}"
+        for row in result["sections"]
+        if row["unreachable"]
+    )
     lines += [
         "",
-        "found: internal breaks with something connected beyond them; others cannot be seen:",
-        "  "
-        + ", ".join(
-            f"{row['local']}→{row['remote']} {row['unreachable']} of {row['opens']}"
-            for row in result["sections"]
-            if row["opens"]
+        *_wrapped(
+            "found: internal breaks with something connected beyond them. Breaks with nothing "
+            f"beyond them cannot be seen: {blind or 'none'}."
         ),
-        "bound: upper bound of the false-trip probability per event, worst class",
+        *_wrapped(
+            "bound: upper bound of the probability of a false trip in one event, worst class."
+        ),
         "",
-        f"{'compared':<10}{'':<25}{'I_set A':>8}{'V_set %':>8}{'Z_set Ω':>8}"
-        f"{'found (interval)':>21}{'false trips':>15}",
+        f"{'compared':<{wide}}{'':<23}{'I_set A':>8}{'V_set %':>8}{'Z_set Ω':>8}"
+        f"{'found (interval)':>18}{'false trips':>16}",
     ]
-    for row in result["compared"]:
-        name = f"{row['local']}→{row['remote']}"
-        if row["i_set_a"] is None:
-            lines.append(f"{name:<10}{row['name']:<25}{'no setting keeps the margin':>30}")
-            continue
-        interval = f"{row['dependability_low']:.3f}..{row['dependability_high']:.3f}"
-        lines.append(
-            f"{name:<10}{row['name']:<25}{row['i_set_a']:>8.1f}{row['v_set_pu'] * 100:>8.1f}"
-            f"{row['z_set_ohm']:>8.1f}{interval:>21}{_of(row['false_trips'], row['trials']):>15}"
-        )
+    lines += [_compared_row(row, wide) for row in result["compared"]]
     return "\n".join(lines)
+
+
+def _setting_row(row: dict[str, Any], wide: int) -> str:
+    head = f"{_name(row):<{wide}}{row['status']:<14}"
+    if row["i_set_a"] is None:
+        return head + row["reason"][: 100 - len(head)]
+    return (
+        f"{head}{row['i_set_a']:>8.1f}{row['v_set_pu'] * 100:>8.1f}"
+        f"{row['z_set_ohm']:>8.1f}{_margin(row['margin']):>8}"
+        f"{_share(row['detected'], row['opens'] - row['unreachable']):>16}"
+        f"{_of(row['false_trips'], row['security_trials']):>16}"
+        f"{row['false_trip_upper']:>9.1e}"
+    )
+
+
+def _compared_row(row: dict[str, Any], wide: int) -> str:
+    head = f"{_name(row):<{wide}}{row['name']:<23}"
+    if row["i_set_a"] is None:
+        return f"{head}no setting keeps the margin"
+    interval = f"{row['dependability_low']:.3f}..{row['dependability_high']:.3f}"
+    return (
+        f"{head}{row['i_set_a']:>8.1f}{row['v_set_pu'] * 100:>8.1f}"
+        f"{row['z_set_ohm']:>8.1f}{interval:>18}{_of(row['false_trips'], row['trials']):>16}"
+    )
+
+
+def _name(row: dict[str, Any]) -> str:
+    return f"{row['local']}→{row['remote']}"
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, 98, subsequent_indent="  ")
 
 
 def _margin(value: float | None) -> str:
@@ -76,7 +93,7 @@ def _margin(value: float | None) -> str:
 
 
 def _share(k: int, n: int) -> str:
-    return f"{k / n:.3f} of {n}" if n else "-"
+    return f"{k / n:.3f} of {n}" if n else "none to find"
 
 
 def _of(k: int, n: int) -> str:

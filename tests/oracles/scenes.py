@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from openphase.detector.impedance import connection_impedance
+from openphase.model import load_feeder
 from openphase.model.network import Network, compile_network, locate
-from openphase.model.parts import Feeder
+from openphase.model.parts import Connection, Feeder, Place
 from openphase.model.points import Points, Terminal, find_points
+from openphase.model.sequence_network import sequence_network, two_port
 from openphase.model.solve import solve, steady_state
 from openphase.model.states import Answer, State
 from openphase.model.symmetrical import to_sequences
 
-__all__ = ["Pair", "Scene", "change", "looks", "opened", "scene", "stepped"]
+__all__ = [
+    "Pair",
+    "Scene",
+    "change",
+    "connected",
+    "constants",
+    "looks",
+    "opened",
+    "ring",
+    "scene",
+    "stepped",
+]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -47,10 +60,14 @@ class Pair:
     v_n: Complex
     i_m: Complex
 
-    def z(self, k: int = 1) -> Complex:
-        """Eq. (5) in sequence or phase ``k``, as the detector has it."""
+    def eq_5(self, k: int) -> tuple[Complex, NDArray[np.bool_]]:
+        """Eq. (5) in sequence or phase ``k``, as the detector has it, and where undefined."""
         v, n, i = self.v_m[:, k], self.v_n[:, k], self.i_m[:, k]
-        return connection_impedance(v[1], n[1], i[1], v[1] - v[0], n[1] - n[0], i[1] - i[0])[0]
+        return connection_impedance(v[1], n[1], i[1], v[1] - v[0], n[1] - n[0], i[1] - i[0])
+
+    def z(self, k: int = 1) -> Complex:
+        """Eq. (5); 0 where it is undefined."""
+        return self.eq_5(k)[0]
 
     def compensated(self, k: int = 1) -> tuple[Complex, Complex]:
         """ΔV_n* and ΔI_m*: the changes that V_m'/V_m does not explain."""
@@ -59,9 +76,10 @@ class Pair:
 
     def rounding_ohm(self, k: int = 1) -> Real:
         """What errors of one part in 1e12 of every phasor may do to ``z``; infinite at 0/0."""
+        z, undefined = self.eq_5(k)
         v, n, i = (np.abs(x[:, k]).max(axis=0) for x in (self.v_m, self.v_n, self.i_m))
         di = np.maximum(np.abs(self.compensated(k)[1]), 1e-300)
-        return 1e-12 * (v + n + np.abs(self.z(k)) * i) / di
+        return np.where(undefined, np.inf, 1e-12 * (v + n + np.abs(z) * i) / di)
 
 
 def scene(feeder: Feeder, closed: frozenset[str] | None = None) -> Scene:
@@ -118,3 +136,43 @@ def change(
         v_n=pick("v", nodes[n]),
         i_m=pick("i", 2 * edges[m] + below[m], inward),
     )
+
+
+def connected(feeder: Feeder, connection: Connection, *names: str) -> Feeder:
+    """``feeder`` with these transformers connected that way, without magnetizing branch."""
+    units = tuple(
+        replace(unit, connection=connection, x0_pu=None) if unit.name in names else unit
+        for unit in feeder.transformers
+    )
+    return replace(feeder, transformers=units)
+
+
+def ring(rng: np.random.Generator) -> Feeder:
+    """The paper's loop with other lines, places, ratings and loads."""
+    paper = load_feeder("paper")
+    lines = tuple(
+        replace(
+            line,
+            z1_ohm_per_km=line.z1_ohm_per_km * rng.uniform(0.5, 2.0),
+            z0_ohm_per_km=line.z0_ohm_per_km * rng.uniform(1.0, 6.0),
+        )
+        for line in paper.lines
+    )
+    places = {"T2": (0.05, 0.5), "T4": (0.65, 0.95)}
+    units = tuple(
+        replace(
+            unit,
+            rating_kva=1000.0 * rng.uniform(0.7, 1.4),
+            place=replace(unit.place, at=float(rng.uniform(*places.get(unit.name, (0.1, 0.9))))),
+        )
+        for unit in paper.transformers
+    )
+    loads = tuple(replace(load, kw=load.kw * rng.uniform(0.5, 1.5)) for load in paper.loads)
+    return replace(paper, lines=lines, transformers=units, loads=loads)
+
+
+def constants(feeder: Feeder, upper: str, lower: str, broken: Place | None = None) -> Complex:
+    """(2, 2) positive-sequence two-port constants between two nodes, taps included."""
+    loads = tuple(replace(load, exponent=2.0) for load in feeder.loads)
+    place = broken or Place(line=feeder.lines[0].name, at=0.5)
+    return two_port(sequence_network(replace(feeder, loads=loads), place), upper, lower)[:, :, 1]
