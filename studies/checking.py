@@ -122,11 +122,11 @@ def _assumed(feeder: Feeder) -> list[str]:
 
 
 def _plot(feeder: Feeder, path: Path) -> None:
-    from .show.plots import plot_feeder, save_png  # noqa: PLC0415  (only a picture needs it)
+    from .show.plots import plot_feeder, save_figure  # noqa: PLC0415  (only a picture needs it)
 
     figure = plot_feeder(feeder).get_figure()
     try:
-        save_png(figure, path)
+        save_figure(figure, path)
     except (OSError, ValueError) as error:
         raise OpenPhaseError(f"{path}: the picture cannot be written: {error}") from error
 

@@ -231,11 +231,11 @@ def _status(
         if hollow
         else ""
     )
+    sure = math.floor(row["dependability_low"] * 1000) / 1000
     if row["dependability_low"] >= demand.find_at_least:
-        return "set", f"no false trip, finds at least {row['dependability_low']:.3f}{note}"
+        return "set", f"no false trip, finds at least {sure:.3f}{note}"
     return "weak", (
-        f"no false trip, but finds only {row['dependability_low']:.3f} for sure, "
-        f"{demand.find_at_least:g} wanted{note}"
+        f"no false trip, but finds only {sure:.3f} for sure, {demand.find_at_least:g} wanted{note}"
     )
 
 

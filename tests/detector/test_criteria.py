@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from oracles.scalar_detector import first_failing
@@ -63,23 +65,23 @@ def single(
 @pytest.mark.parametrize("negative_sign", [True, False])
 def test_verdict_is_the_scalar_one(negative_sign: bool) -> None:
     evidence = random_evidence(np.random.default_rng(1), (4, 500))
+    columns = (
+        evidence.di1_a,
+        evidence.dv1_pu,
+        evidence.z1_ohm,
+        evidence.blocked,
+        evidence.undefined,
+    )
+    rows: list[tuple[Any, Any, Any, Any, Any]] = list(
+        zip(*(x.ravel().tolist() for x in columns), strict=True)
+    )
     seen = set()
     for i in I_GRID:
         for v in V_GRID:
             for z in Z_GRID:
                 settings = settings_of(i, v, z, negative_sign)
                 found = verdict(evidence, settings)
-                expected = [
-                    first_failing(*(x.item() for x in row), settings)
-                    for row in zip(
-                        evidence.di1_a.flat,
-                        evidence.dv1_pu.flat,
-                        evidence.z1_ohm.flat,
-                        evidence.blocked.flat,
-                        evidence.undefined.flat,
-                        strict=True,
-                    )
-                ]
+                expected = [first_failing(*row, settings) for row in rows]
                 np.testing.assert_array_equal(found.ravel(), expected)
                 seen |= set(expected)
     assert seen == set(Reason) - (set() if negative_sign else {Reason.SIGN})

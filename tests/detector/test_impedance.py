@@ -92,7 +92,7 @@ def test_defined_and_undefined_stand_side_by_side_in_any_shape() -> None:
     zero = np.zeros_like(v)
     z, undefined = connection_impedance(v, v, zero, zero, np.full_like(v, -5.0), di)
     np.testing.assert_array_equal(undefined, di == 0)
-    np.testing.assert_allclose(z, [[0, -5, 0], [-2.5, 0, 5]])
+    np.testing.assert_allclose(z, np.array([[0, -5, 0], [-2.5, 0, 5]], np.complex128))
 
 
 def test_inputs_stay_as_they_were() -> None:

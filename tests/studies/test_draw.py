@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def steps(drawn: dict[DrawClass, Scenarios]) -> Scenarios:
     return drawn[DrawClass.LOAD_STEP]
 
 
-def assert_share(chosen: NDArray[np.bool_], expected: float) -> None:
+def assert_share(chosen: Any, expected: float) -> None:
     error = math.sqrt(expected * (1.0 - expected) / chosen.size)
     assert abs(chosen.mean() - expected) < 5.0 * error
 
