@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..model.compiled import compiled
+
 __all__ = ["disc_noise", "measure"]
 
 Complex = NDArray[np.complex128]
@@ -18,16 +20,18 @@ def disc_noise(rng: np.random.Generator, shape: tuple[int, ...]) -> Complex:
     A normal law with standard deviation 1/3 per axis, truncated at radius 1: what falls
     outside (1.1 % of draws) is drawn again.
     """
-    pairs = rng.standard_normal((*shape, 2))
-    error: Complex = pairs.view(np.complex128)[..., 0]
-    flat = error.reshape(-1)
-    far = np.flatnonzero(flat.real**2 + flat.imag**2 > SIGMAS**2)
-    while far.size:
-        flat[far] = rng.standard_normal((far.size, 2)).view(np.complex128)[:, 0]
-        again = flat[far]
-        far = far[again.real**2 + again.imag**2 > SIGMAS**2]
-    error /= SIGMAS
+    error = np.empty(shape, np.complex128)
+    _fill(rng, error.reshape(-1))
     return error
+
+
+@compiled
+def _fill(rng: np.random.Generator, error: Complex) -> None:
+    for k in range(error.size):
+        x, y = rng.standard_normal(), rng.standard_normal()
+        while x * x + y * y > SIGMAS * SIGMAS:
+            x, y = rng.standard_normal(), rng.standard_normal()
+        error[k] = complex(x / SIGMAS, y / SIGMAS)
 
 
 def measure(true: Complex, error: Complex, tve_pct: float, floor: float) -> Complex:

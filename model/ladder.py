@@ -52,7 +52,6 @@ __all__ = ["solve_block"]
 
 Real = NDArray[np.float64]
 
-UNDAMPED = 30  #: passes before the fixed point takes half steps, which end 2-cycles
 
 
 @compiled
@@ -285,10 +284,15 @@ def descend(tree: Tree, work: Work, edge: int, share: float, mask: int) -> None:
 
 
 @compiled
-def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, step: float) -> float:
-    """Move winding and step voltages towards the solved ones; returns the largest gap, pu."""
+def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, first: bool) -> float:
+    """Move winding and step voltages towards the solved ones; returns the largest gap, pu.
+
+    From the second pass on the step follows the secant through this pass and the last
+    (Anderson's mixing of depth one), which also ends cycles and creeping near collapse.
+    ``history`` (3, U + 1, 3): the last pass's voltages and gaps, and this pass's gaps.
+    """
     units = tree.unit_node.size
-    change = 0.0
+    change = along = across = 0.0
     for unit in range(units + 1):
         if unit < units:
             v = times(load(work.g, unit), load_vector(work.v, tree.unit_node[unit]))
@@ -297,8 +301,19 @@ def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, step: float) -> f
         for i in range(3):
             size = np.sqrt(v[i].real ** 2 + v[i].imag ** 2) / tree.v_nominal_v
             gap = size - unit_v_pu[unit, i]
+            turn = gap - history[1, unit, i]
             change = max(change, abs(gap))
-            unit_v_pu[unit, i] += step * gap
+            along += gap * turn
+            across += turn * turn
+            history[2, unit, i] = gap
+    back = 0.0 if first or across == 0.0 else along / across
+    for unit in range(units + 1):
+        for i in range(3):
+            v_pu, gap = unit_v_pu[unit, i], history[2, unit, i]
+            moved = v_pu - history[0, unit, i] + gap - history[1, unit, i]
+            unit_v_pu[unit, i] = max(v_pu + gap - back * moved, 0.0)
+            history[0, unit, i] = v_pu
+            history[1, unit, i] = gap
     return change
 
 
@@ -324,6 +339,7 @@ def solve_block(
     exponent, v, stub = state.exponent, work.v, work.stub
     i_up, i_low = work.i_up, work.i_low
     unit_v_pu = np.empty((unit_out.shape[0], 3))
+    history = np.zeros((3, unit_out.shape[0], 3))
     turn = np.exp(-2j * np.pi / 3)
     for s in range(state.emf_pu.size):
         edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
@@ -345,7 +361,7 @@ def solve_block(
             set_admittances(tree, state, work, s, unit_v_pu, floor_pu)
             flags = climb(tree, work, edge, share, mask)
             descend(tree, work, edge, share, mask)
-            change = update_magnitudes(tree, work, unit_v_pu, 0.5 if passes > UNDAMPED else 1.0)
+            change = update_magnitudes(tree, work, unit_v_pu, history, passes == 1)
             settled = linear or change <= tolerance_pu
         answer.flags[s] = flags if settled else flags | NOT_CONVERGED
         answer.passes[s] = passes

@@ -16,7 +16,7 @@ __all__ = ["FLOOR_PU", "all_probes", "new_answer", "solve", "steady_state"]
 
 FLOOR_PU = 0.7  #: below it a load is constant impedance, at its admittance there
 TOLERANCE_PU = 1e-12  #: largest change of a winding voltage in the last pass
-MOST_PASSES = 2000  #: near voltage collapse the fixed point creeps; such scenarios are rare
+MOST_PASSES = 200
 
 
 def all_probes(network: Network) -> Probes:

@@ -182,6 +182,20 @@ def test_linear_feeders_only_scale_with_the_source_so_that_eq_5_is_0_over_0() ->
             assert np.abs(di) < 1e-12 * np.abs(first.i).max()
 
 
+def test_balanced_states_do_not_know_how_a_unit_is_connected() -> None:
+    """Any connection shows the same leakage and load to a balanced voltage, at any exponent."""
+    for seed in SEEDS:
+        at = scene(random_feeder(np.random.default_rng([seed, 107]), 5))
+        transformer = np.arange(len(at.network.units)) < len(at.feeder.transformers)
+        state = at.states(4)
+        connection = state.connection.copy()
+        connection[transformer, 1:] = range(3)
+        answer = looks(at, state._replace(connection=connection))
+        scale = at.network.tree.v_nominal_v
+        assert np.abs(answer.v - answer.v[..., :1]).max() < 1e-10 * scale
+        assert np.abs(answer.i - answer.i[..., :1]).max() < 1e-9 * np.abs(answer.i).max()
+
+
 # --- an open phase in a radial section -------------------------------------------------
 
 

@@ -13,6 +13,7 @@ from oracles.scenes import change, connected, constants, looks, opened, ring, sc
 
 from openphase.model import Feeder, load_feeder
 from openphase.model.closed_form import z_op1_loop_approx
+from openphase.model.network import locate
 
 SEEDS = range(30)
 MASKS = (0b001, 0b010, 0b100, 0b011, 0b101, 0b110, 0b111)
@@ -152,3 +153,35 @@ def test_in_the_head_section_a_load_is_an_open_phase_to_the_far_end() -> None:
         for state in states:
             pair = change(at, at.terminal("R2", "R1"), first, looks(at, state))
             assert (np.abs(pair.z() + b) <= pair.rounding_ohm()).all()
+
+
+def test_it_does_not_matter_where_the_solver_cuts_the_loop() -> None:
+    """The same ring with its lines listed backwards closes over another chord."""
+    for seed in SEEDS:
+        feeder = ring(np.random.default_rng([seed, 109]))
+        one = scene(feeder, frozenset({"R4"}))
+        two = scene(replace(feeder, lines=feeder.lines[::-1]), frozenset({"R4"}))
+        chords = {at.network.pieces[-1].line for at in (one, two)}
+        assert len(chords) == 2
+        for line in chords:
+            for fraction in (0.02, 0.97):
+                seen = []
+                for at in (one, two):
+                    buses = [at.network.node(bus) for bus in ("R2", "R3", "R4", "R4b")]
+                    open_, on = (
+                        looks(at, opened(at, at.steady, line, fraction, *MASKS)),
+                        looks(at, stepped(at, at.steady, line, fraction, (3e5, 1e5, 0.0))),
+                    )
+                    edge, _ = locate(at.network, line, fraction)
+                    ends = slice(None) if at.network.upward[edge] else slice(None, None, -1)
+                    points = 2 * at.points.edge + at.points.below
+                    sign = np.where(at.points.below, -1.0, 1.0)[:, None, None]
+                    seen.append(
+                        [
+                            np.concatenate([answer.v[buses], answer.stub[ends]])
+                            for answer in (open_, on)
+                        ]
+                        + [sign * answer.i[points] for answer in (open_, on)]
+                    )
+                for first, second in zip(*seen, strict=True):
+                    assert np.abs(first - second).max() < 1e-7  # volts and amperes
