@@ -20,6 +20,7 @@ from openphase.studies.run.choose import as_settings, choices, gather, planned_b
 from openphase.studies.run.classes import REPORTED, Purpose
 from openphase.studies.run.draw import make_case
 from openphase.studies.run.engine import BLOCK
+from openphase.studies.run.ledger import Attempt
 from openphase.studies.run.spec import default_study
 from openphase.studies.run.store import RunFolder
 from openphase.studies.run.tally import Tested, Trained, device_grid, judge_block, train_block
@@ -30,6 +31,11 @@ TRAINING = 8_000
 VALIDATION = 40_000
 
 
+def attempt(seed: int, scenarios: int) -> Attempt:
+    """A first attempt, in no ledger."""
+    return Attempt(number=1, scenarios=scenarios, population="", study="", seed=seed)
+
+
 def main() -> None:
     """Print, per margin, how often a choice trips falsely and what it finds."""
     study, feeder = default_study("paper"), load_feeder("paper")
@@ -37,7 +43,7 @@ def main() -> None:
         ways: list[list[object]] = []
         for seed in SEEDS:
             case = make_case(feeder, study)
-            blocks = planned_blocks(case, Purpose.TRAIN, seed, 1, TRAINING)
+            blocks = planned_blocks(case, Purpose.TRAIN, attempt(seed, TRAINING))
             folder = RunFolder(Path(scratch) / str(seed))
             compute = functools.partial(train_block, case)
             trained = run_blocks(compute, Trained, blocks, folder, 2, f"seed {seed}")
@@ -48,7 +54,7 @@ def main() -> None:
                 chosen = choices(own, device_grid(own), training)
                 ways.append([as_settings(own, pair[0]) for pair in chosen])
         settings = tuple(zip(*ways, strict=True))
-        blocks = planned_blocks(case, Purpose.VALIDATE, 1, 1, VALIDATION)
+        blocks = planned_blocks(case, Purpose.VALIDATE, attempt(1, VALIDATION))
         compute = functools.partial(judge_block, case, settings=settings)
         tested = run_blocks(compute, Tested, blocks, RunFolder(Path(scratch)), 2, "validation")
         total = add_up(tested, BLOCK)

@@ -25,6 +25,7 @@ from openphase.model.states import Answer
 from openphase.studies.run import draw, engine
 from openphase.studies.run.choose import planned_blocks
 from openphase.studies.run.classes import DrawClass, Purpose
+from openphase.studies.run.ledger import Attempt
 
 TRIALS = 57_700  #: per class, as the certificate plans them; they give the mix its proportions
 SEED = 1
@@ -118,7 +119,8 @@ def _run(case: draw.Case, mix: list[draw.BlockId]) -> dict[str, Any]:
 
 def _mix(case: draw.Case, scenarios: int) -> list[draw.BlockId]:
     """Blocks of every class in the study's proportions, class after class."""
-    planned = Counter(b.drawn for b in planned_blocks(case, Purpose.VALIDATE, SEED, 1, TRIALS))
+    attempt = Attempt(number=1, scenarios=TRIALS, population="", study="", seed=SEED)
+    planned = Counter(b.drawn for b in planned_blocks(case, Purpose.VALIDATE, attempt))
     share = scenarios / engine.BLOCK / planned.total()
     stops = np.rint(share * np.cumsum(list(planned.values()))).astype(int)
     counts = np.maximum(np.diff(stops, prepend=0), 1)

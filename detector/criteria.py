@@ -52,12 +52,13 @@ _TEXT = {
 def verdict(evidence: Evidence, settings: Settings) -> NDArray[np.int8]:
     """A Reason for every terminal and scenario of ``evidence``, one setting for all."""
     reason = np.zeros(evidence.di1_a.shape, np.int8)
-    # the last assignment wins, so the first criterion is written last
+    # the last assignment wins, so the first criterion is written last; written as "not held",
+    # so that a number that is none holds no criterion
     if settings.negative_sign:
-        reason[evidence.z1_ohm.real >= 0] = Reason.SIGN
-    reason[(np.abs(evidence.z1_ohm) < settings.z_set_ohm) | evidence.undefined] = Reason.IMPEDANCE
-    reason[evidence.dv1_pu > settings.v_set_pu] = Reason.VOLTAGE
-    reason[evidence.di1_a < settings.i_set_a] = Reason.CURRENT
+        reason[~(evidence.z1_ohm.real < 0)] = Reason.SIGN
+    reason[~(np.abs(evidence.z1_ohm) >= settings.z_set_ohm) | evidence.undefined] = Reason.IMPEDANCE
+    reason[~(evidence.dv1_pu <= settings.v_set_pu)] = Reason.VOLTAGE
+    reason[~(evidence.di1_a >= settings.i_set_a)] = Reason.CURRENT
     reason[evidence.blocked] = Reason.BLOCKED
     return reason
 

@@ -53,7 +53,6 @@ __all__ = ["solve_block"]
 Real = NDArray[np.float64]
 
 
-
 @compiled
 def up(y: Matrix, z: Matrix) -> tuple[Matrix, Matrix]:
     """F and W of the series impedance ``z`` above ``y``."""

@@ -61,15 +61,15 @@ def into_line(points: Points) -> NDArray[np.float64]:
 
 def find_points(feeder: Feeder, network: Network) -> Points:
     """Place the feeder's points and sections in ``network``."""
-    edge, below = zip(*(_end(network, p) for p in feeder.points), strict=True)
+    ends = [_end(network, p) for p in feeder.points]
     terminals = []
     for section in feeder.sections:
         terminals += _terminals(feeder, network, section)
     return Points(
         names=tuple(p.name for p in feeder.points),
         node=np.array([network.node(p.bus) for p in feeder.points], np.int64),
-        edge=np.array(edge, np.int64),
-        below=np.array(below, np.bool_),
+        edge=np.array([edge for edge, _ in ends], np.int64),
+        below=np.array([below for _, below in ends], np.bool_),
         terminals=tuple(terminals),
     )
 

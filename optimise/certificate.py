@@ -51,6 +51,6 @@ def share_of_alpha(confidence: float, attempt: int, terminals: int) -> float:
     """Error probability of each bound: attempt j has (1 - confidence) / 2^j for all terminals.
 
     The sum over all attempts is 1 - ``confidence``, so retrying until it succeeds buys
-    nothing; the union over terminals lets all their bounds hold together.
+    nothing; the union over terminals lets their false-trip bounds hold together.
     """
     return (1.0 - confidence) / 2.0**attempt / max(terminals, 1)

@@ -34,6 +34,15 @@ class Front:
         """Number of events."""
         return int(self.di1_a.size)
 
+    def where(self, chosen: NDArray[np.bool_]) -> Front:
+        """Some of the events."""
+        return Front(
+            di1_a=self.di1_a[chosen],
+            dv1_pu=self.dv1_pu[chosen],
+            reach_ohm=self.reach_ohm[chosen],
+            scenario=self.scenario[chosen],
+        )
+
 
 def front_of(di1_a: Real, dv1_pu: Real, reach_ohm: Real, scenario: Int) -> Front:
     """Reduce events to their front; events that trip at no setting (reach 0) drop out.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .counts import Corners, Grid, corners_of, count_tensor
 from .staircase import Front, margins
 
-__all__ = ["Choice", "allowed", "choose"]
+__all__ = ["Choice", "Sample", "allowed", "choose"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +28,16 @@ class Choice:
     z_set_ohm: float
     detected: int
     margin: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sample:
+    """What a training sample says about one terminal."""
+
+    opens: Corners  #: breaks that must be found
+    stiff: Corners  #: the same with |ΔI1| and reach divided, |ΔV1| multiplied by the margin
+    trials: int  #: how many breaks there were, found or not
+    front: Front  #: events that must not trip
 
 
 def allowed(grid: Grid, front: Front, margin: float) -> NDArray[np.bool_]:
@@ -44,10 +54,7 @@ def allowed(grid: Grid, front: Front, margin: float) -> NDArray[np.bool_]:
 
 def choose(
     grid: Grid,
-    opens: Corners,
-    stiff_opens: Corners,
-    trials: int,
-    front: Front,
+    sample: Sample,
     margin: float,
     reference: tuple[float, float, float],
     only_v: int | None = None,
@@ -57,12 +64,8 @@ def choose(
     Parameters
     ----------
     grid : Grid
-    opens, stiff_opens : Corners
-        Breaks that must be found, as they are and reduced by ``margin`` (see ``stiffen``).
-    trials : int
-        How many breaks there were, found or not.
-    front : Front
-        Events that must not trip.
+    sample : Sample
+        The training sample of one terminal.
     margin : float
         Demanded margin, at least 1.
     reference : tuple of (I_set, V_set, Z_set)
@@ -70,20 +73,21 @@ def choose(
     only_v : int, optional
         Look only at this index of ``grid.v_set_pu``.
     """
-    free = allowed(grid, front, margin)
+    free = allowed(grid, sample.front, margin)
     if only_v is not None:
         mask = np.zeros(grid.shape[0], np.bool_)
         mask[only_v] = True
         free &= mask[:, None, None]
     if not free.any():
         return None
-    found = np.where(free, count_tensor(grid, opens), -1)
+    found = np.where(free, count_tensor(grid, sample.opens), -1)
     best = int(found.max())
-    error = np.sqrt(best * (trials - best) / trials) if trials else 0.0
+    n = sample.trials
+    error = np.sqrt(best * (n - best) / n) if n else 0.0
     v, i, z = np.nonzero(free & (found >= best - error))
     settings = grid.i_set_a[i], grid.v_set_pu[v], grid.z_set_ohm[z]
-    security = margins(front, *settings)
-    stiff = count_tensor(grid, stiff_opens)[v, i, z]
+    security = margins(sample.front, *settings)
+    stiff = count_tensor(grid, sample.stiff)[v, i, z]
     distance = np.abs(np.log(np.stack(settings) / np.array(reference)[:, None])).sum(axis=0)
     # lexsort: last key first
     pick = int(np.lexsort((z, i, v, distance, -stiff, -security))[0])

@@ -27,8 +27,15 @@ from .run.choose import Training, as_settings, choices, gather, more_blocks, pla
 from .run.classes import Purpose
 from .run.draw import BlockId, Case, make_case
 from .run.engine import BLOCK
-from .run.ledger import attempt_number
-from .run.spec import Study, check_study, default_study, dump_study, read_study
+from .run.ledger import Attempt, enter, find_attempt
+from .run.spec import (
+    Study,
+    check_study,
+    default_study,
+    dump_population,
+    dump_study,
+    read_study,
+)
 from .run.store import RunFolder, as_json
 from .run.tally import Tested, Trained, device_grid, judge_block, train_block
 from .show.report import write_report
@@ -109,26 +116,32 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
         If the folder cannot be used, or the run is long and ``demand.yes`` is not set.
     """
     case = make_case(feeder, study)
-    content = digest(dump_feeder(feeder), dump_study(study))
-    # an attempt is entered under the size that was asked for, or that a first attempt needs
-    asked = demand.scenarios or _default_scenarios(case, 1)
-    attempt = attempt_number(out.parent / "ledger.json", content, demand.seed, asked)
-    scenarios = demand.scenarios or _default_scenarios(case, attempt)
+    book = out.resolve().parent / "ledger.json"
+    attempt = find_attempt(
+        book,
+        digest(dump_feeder(feeder), dump_population(study)),
+        digest(dump_study(study)),
+        demand.seed,
+        demand.scenarios or functools.partial(_default_scenarios, case),
+    )
+    manifest = _manifest(feeder, study, attempt)
     folder = RunFolder(out)
-    if news := folder.open(_manifest(feeder, study, demand, scenarios, attempt)):
-        say(news)
+    train = planned_blocks(case, Purpose.TRAIN, attempt)
+    _announce(case, folder, folder.finds(manifest), train, attempt, demand)
+    folder.begin(manifest)
+    enter(book, attempt)
     folder.write("study.toml", dump_study(study))
-    folder.log(f"size {feeder.name}, seed {demand.seed}, attempt {attempt}, n {scenarios}")
+    folder.log(
+        f"size {feeder.name}, seed {attempt.seed}, attempt {attempt.number}, n {attempt.scenarios}"
+    )
     watch = Watch()
-    train = planned_blocks(case, Purpose.TRAIN, demand.seed, attempt, scenarios)
-    _announce(case, folder, train, scenarios, demand)
-    training = _train(case, train, folder, demand.jobs, scenarios)
+    training = _train(case, train, folder, demand.jobs, attempt.scenarios)
     watch.lap("train_s")
     chosen = choices(case, device_grid(case), training)
     watch.lap("choose_s")
-    test = planned_blocks(case, Purpose.VALIDATE, demand.seed, attempt, scenarios)
+    test = planned_blocks(case, Purpose.VALIDATE, attempt)
     settings = _compared_settings(case, chosen)
-    validation = _validate(case, test, settings, folder, demand.jobs, scenarios)
+    validation = _validate(case, test, settings, folder, demand.jobs, attempt.scenarios)
     watch.lap("validate_s")
     answer = {
         "version": __version__,
@@ -136,9 +149,9 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
         "feeder": feeder.name,
         "study_hash": digest(dump_study(study)),
         "confidence": study.certificate.confidence,
-        "attempt": attempt,
-        "scenarios": scenarios,
-        **_certified(case, chosen, settings, training, validation, attempt),
+        "attempt": attempt.number,
+        "scenarios": attempt.scenarios,
+        **_certified(case, chosen, settings, training, validation, attempt.number),
     }
     sizing = Sizing(result=answer, case=case, training=training, validation=validation)
     folder.write("result.json", as_json(answer))
@@ -250,15 +263,25 @@ def _default_scenarios(case: Case, attempt: int) -> int:
 
 
 def _announce(
-    case: Case, folder: RunFolder, train: list[BlockId], scenarios: int, demand: Demand
+    case: Case,
+    folder: RunFolder,
+    found: str,
+    train: list[BlockId],
+    attempt: Attempt,
+    demand: Demand,
 ) -> None:
     """Say how much there is to do and how long it takes; ask for --yes where that is long."""
     say(
         f"{case.feeder.name}: {len(case.points.terminals)} terminals, "
-        f"{judged(case.points.terminals)} to judge; {scenarios:,} scenarios per class and side "
-        f"at least, attempt {train[0].attempt}"
+        f"{judged(case.points.terminals)} to judge; {attempt.scenarios:,} scenarios per class "
+        f"and side at least, attempt {attempt.number}"
     )
-    left = max(2 * len(train) - folder.count_blocks(), 0)
+    there = folder.count_blocks() if found == "this run" else 0
+    if found == "another run":
+        say(f"{folder.path}: inputs have changed since the last run; starting afresh")
+    elif there:
+        say(f"{folder.path}: resuming, {there} blocks are there")
+    left = max(2 * len(train) - there, 0)
     if not left:
         return
     say("compiling the solver, at first use …")
@@ -291,21 +314,22 @@ def code_digest() -> str:
         return digest(*(path.read_text(encoding="utf-8") for path in files))
 
 
-def _manifest(
-    feeder: Feeder, study: Study, demand: Demand, scenarios: int, attempt: int
-) -> dict[str, object]:
+def _manifest(feeder: Feeder, study: Study, attempt: Attempt) -> dict[str, object]:
     """What the run was made from; resuming needs the same."""
     libraries = ("numpy", "scipy", "numba")
     return {
-        "command": ["size", feeder.name, "--seed", demand.seed, "--scenarios", scenarios],
+        "command": [
+            *("size", feeder.name, "--study", "study.toml"),
+            *("--seed", attempt.seed, "--scenarios", attempt.scenarios),
+        ],
         "openphase": __version__,
         "code_sha256": code_digest(),
         "python": platform.python_version(),
         "libraries": {name: metadata.version(name) for name in libraries},
         "feeder_sha256": digest(dump_feeder(feeder)),
         "study_sha256": digest(dump_study(study)),
-        "seed": demand.seed,
-        "scenarios": scenarios,
-        "attempt": attempt,
+        "seed": attempt.seed,
+        "scenarios": attempt.scenarios,
+        "attempt": attempt.number,
         "block": BLOCK,
     }

@@ -32,13 +32,18 @@ def path_starts(
         for k, p in enumerate(network.pieces)
     ]
     starts, toward = np.zeros(len(ends)), np.ones(len(ends), np.bool_)
-    here = network.nodes[case.points.node[point]]
-    left = set(np.flatnonzero(on_path).tolist())
+    # closed switches have no length, and lie on the way
+    switches = [p is not None and p.line is None for p in network.pieces]
+    here = {network.nodes[case.points.node[point]]}
+    left = {int(k) for k in np.flatnonzero(on_path | switches)}
     at = 0.0
-    while left:
-        k = next(k for k in left if here in ends[k])
+    while met := sorted((not switches[k], k) for k in left if here & set(ends[k])):
+        _, k = met[0]
         left.remove(k)
-        starts[k], toward[k] = at, ends[k][0] == here
-        at += network.length_km[k]
-        here = ends[k][1] if toward[k] else ends[k][0]
+        starts[k], toward[k] = at, ends[k][0] in here
+        if switches[k]:
+            here |= set(ends[k])
+        else:
+            at += network.length_km[k]
+            here = {ends[k][1] if toward[k] else ends[k][0]}
     return starts, toward

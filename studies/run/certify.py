@@ -46,6 +46,9 @@ class Validation:
     samples: tuple[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]], ...]  #: for pictures
 
 
+#: how a reported class is drawn
+CLASS_IDS = {own.name: int(own.drawn) for own in REPORTED}
+
 #: what simply adds up over blocks
 ADDED = ("trials", "effective", "trips", "reachable", "found", "missed", "profile", "flags")
 
@@ -209,6 +212,8 @@ def _status(
         return "none", f"no setting of the device keeps the margin {demand.margin:g} in training"
     if row["false_trips"]:
         worst = max(must_not, key=lambda own: own["trips"] / own["trials"])
+        of_worst = front.scenario[:, 0] == CLASS_IDS[worst["name"]]
+        front = front.where(of_worst) if of_worst.any() else front
         n, _ = nearest(front, row["i_set_a"], row["v_set_pu"], row["z_set_ohm"])
         return "not_certified", (
             f"{worst['trips']} false trips of {worst['trials']} in {worst['name']} "

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from ...detector.criteria import Settings
 from ...optimise.counts import Corners, Grid, merge
 from ...optimise.staircase import Front, merge_fronts
-from ...optimise.thresholds import Choice, choose
+from ...optimise.thresholds import Choice, Sample, choose
 from .classes import REPORTED, DrawClass, Purpose
 from .draw import BlockId, Case
 from .engine import BLOCK
+from .ledger import Attempt
 from .tally import Trained
 
 __all__ = ["Training", "choices", "gather", "more_blocks", "planned_blocks"]
@@ -38,14 +39,16 @@ class Training:
     reachable: NDArray[np.int64]  #: (T,)
 
 
-def planned_blocks(case: Case, purpose: Purpose, seed: int, attempt: int, n: int) -> list[BlockId]:
-    """Blocks that most likely give every class, side and judged terminal ``n`` trials."""
-    blocks = []
+def planned_blocks(case: Case, purpose: Purpose, attempt: Attempt) -> list[BlockId]:
+    """Blocks that most likely give every class, side and judged terminal its trials."""
+    n, blocks = attempt.scenarios, []
     for drawn in DrawClass:
         share = _smallest_share(case, drawn)
         draws = n / share + 4.0 * math.sqrt(n * (1.0 - share)) / share
         blocks += [
-            BlockId(seed=seed, purpose=purpose, attempt=attempt, drawn=drawn, block=b)
+            BlockId(
+                seed=attempt.seed, purpose=purpose, attempt=attempt.number, drawn=drawn, block=b
+            )
             for b in range(math.ceil(draws / BLOCK))
         ]
     return blocks
@@ -60,9 +63,11 @@ def more_blocks(case: Case, had: list[BlockId], trials: NDArray[np.int64], n: in
         rows = [r for r in BOUNDED if REPORTED[r].drawn == drawn and trials[r].any()]
         if not own or not rows or not judged:
             continue
-        least = int(trials[np.ix_(rows, judged)].min())
+        counts = trials[np.ix_(rows, judged)]
+        # a class that cannot occur at a terminal has no trials there, however many are drawn
+        least = int(counts[counts > 0].min(initial=n))
         if least < n:
-            per_block = max(least / len(own), 1.0)
+            per_block = least / len(own)
             extra = math.ceil(1.2 * (n - least) / per_block)
             blocks += [
                 BlockId(
@@ -130,16 +135,13 @@ def choices(case: Case, grid: Grid, training: Training) -> list[tuple[Choice | N
             continue
 
         def best(only_v: int | None, t: int = t) -> Choice | None:
-            return choose(
-                grid,
-                training.opens[t],
-                training.stiff[t],
-                int(training.reachable[t]),
-                training.front[t],
-                case.study.certificate.margin,
-                wanted,
-                only_v,
+            sample = Sample(
+                opens=training.opens[t],
+                stiff=training.stiff[t],
+                trials=int(training.reachable[t]),
+                front=training.front[t],
             )
+            return choose(grid, sample, case.study.certificate.margin, wanted, only_v)
 
         found.append((best(None), best(int(at_reference_v[0])) if at_reference_v.size else None))
     return found

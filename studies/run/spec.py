@@ -49,6 +49,7 @@ __all__ = [
     "TransformerDraw",
     "check_study",
     "default_study",
+    "dump_population",
     "dump_study",
     "read_study",
     "study_from_toml",
@@ -318,3 +319,22 @@ def dump_study(study: Study) -> str:
     for table, part in _parts(study).items():
         blocks.append(f"[{table}]\n{toml_rows(as_table(part))}")
     return "\n".join(blocks)
+
+
+#: tables that say which scenarios there are; the others say what is demanded of settings
+POPULATION = (
+    "loads",
+    "transformers",
+    "ambient",
+    "network",
+    "events.open_phase",
+    "events.load_step",
+    "events.source_step",
+    "instruments",
+)
+
+
+def dump_population(study: Study) -> str:
+    """Return the part of a study's text that decides which scenarios are drawn."""
+    parts = _parts(study)
+    return "\n".join(f"[{table}]\n{toml_rows(as_table(parts[table]))}" for table in POPULATION)

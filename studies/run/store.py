@@ -12,7 +12,7 @@ import typing
 import zipfile
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,17 @@ from ...model.errors import OpenPhaseError
 __all__ = ["RunFolder", "as_json", "pack", "unpack", "write_whole"]
 
 T = TypeVar("T")
+
+#: what reading a damaged block may raise, down to the zip format's own refusals
+DAMAGED = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    zipfile.BadZipFile,
+)
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -79,6 +90,25 @@ def _length(flat: dict[str, NDArray[Any]], name: str) -> int:
     return len(heads)
 
 
+#: what a run leaves behind, beside its blocks; nothing else is ever removed
+OWN = (
+    "manifest.json",
+    "study.toml",
+    "result.json",
+    "settings.csv",
+    "report.html",
+    "timing.json",
+    "log.txt",
+    "overview.png",
+    "feeder.png",
+    "*-evidence.png",
+    "*-along-line.png",
+    "*.part",
+    "blocks/*.npz",
+    "blocks/*.part",
+)
+
+
 class RunFolder:
     """A study's folder on disk."""
 
@@ -86,40 +116,40 @@ class RunFolder:
         self.path = path
         self.blocks = path / "blocks"
 
-    def open(self, manifest: dict[str, object]) -> str | None:
-        """Prepare the folder for a run with these inputs; returns what to tell the user.
+    def finds(self, manifest: dict[str, object]) -> Literal["nothing", "this run", "another run"]:
+        """What is in the folder, seen from a run with these inputs; nothing is written.
 
-        A folder whose manifest differs is emptied of what openphase put there.
+        Raises OpenPhaseError where the folder holds anything but a run of openphase.
         """
-        text = as_json(manifest)
-        known = self.path / "manifest.json"
-        said = None
         try:
-            if known.exists():
-                if known.read_text(encoding="utf-8") == text:
-                    blocks = self.count_blocks()
-                    return f"{self.path}: resuming, {blocks} blocks are there" if blocks else None
-                said = f"{self.path}: inputs have changed since the last run; starting afresh"
-                self._empty()
-            elif self.path.exists() and any(self.path.iterdir()):
-                raise OpenPhaseError(
-                    f"{self.path}: holds files but no run of openphase; choose another --out"
-                )
+            if not self.path.exists() or not any(self.path.iterdir()):
+                return "nothing"
+            text = (self.path / "manifest.json").read_text(encoding="utf-8")
+            known = json.loads(text)
+        except (FileNotFoundError, ValueError):
+            known = None
         except OSError as error:
             raise OpenPhaseError(f"{self.path}: {error.strerror or error}") from error
-        self.write("manifest.json", text)
-        return said
+        if not isinstance(known, dict) or not manifest.keys() <= known.keys():
+            raise OpenPhaseError(
+                f"{self.path}: holds files, but no run of openphase; choose another --out"
+            )
+        return "this run" if text == as_json(manifest) else "another run"
+
+    def begin(self, manifest: dict[str, object]) -> None:
+        """Make the folder this run's own: another run's files are removed, and only these."""
+        if self.finds(manifest) == "another run":
+            try:
+                for pattern in OWN:
+                    for file in self.path.glob(pattern):
+                        file.unlink()
+            except OSError as error:
+                raise OpenPhaseError(f"{self.path}: {error.strerror or error}") from error
+        self.write("manifest.json", as_json(manifest))
 
     def count_blocks(self) -> int:
         """How many blocks are stored."""
         return len(list(self.blocks.glob("*.npz")))
-
-    def _empty(self) -> None:
-        for file in self.blocks.glob("*.npz*"):
-            file.unlink()
-        for pattern in ("*.json", "*.toml", "*.csv", "*.html", "*.png", "*.svg", "*.part"):
-            for file in self.path.glob(pattern):
-                file.unlink()
 
     def write(self, name: str, content: str | bytes) -> Path:
         """Write one file of the run."""
@@ -134,11 +164,11 @@ class RunFolder:
 
     def block(self, name: str, kind: type[T]) -> T | None:
         """A block that is there already, else None; a damaged one counts as not there."""
-        path = self.blocks / f"{name}.npz"
         try:
-            with np.load(path, allow_pickle=False) as file:
+            content = io.BytesIO((self.blocks / f"{name}.npz").read_bytes())
+            with np.load(content, allow_pickle=False) as file:
                 return unpack(kind, {key: file[key] for key in file.files})
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+        except DAMAGED:
             return None
 
     def keep_block(self, name: str, value: object) -> None:

@@ -28,7 +28,7 @@ def sheet_table(result: dict[str, Any]) -> str:
     wide = max(8, *(len(_name(row)) for row in result["sections"])) + 2
     lines = [
         f"{result['feeder']}: settings, seed {result['seed']}, attempt {result['attempt']}; "
-        f"all bounds together at {result['confidence']:.0%} confidence",
+        f"false-trip bounds of all terminals together at {result['confidence']:.0%} confidence",
         "",
         f"{'terminal':<{wide}}{'status':<14}{'I_set A':>8}{'V_set %':>8}{'Z_set Ω':>8}{'margin':>8}"
         f"{'found':>16}{'false trips':>16}{'bound':>9}",
@@ -59,7 +59,7 @@ def sheet_table(result: dict[str, Any]) -> str:
 def _setting_row(row: dict[str, Any], wide: int) -> str:
     head = f"{_name(row):<{wide}}{row['status']:<14}"
     if row["i_set_a"] is None:
-        return head + row["reason"][: 100 - len(head)]
+        return head + str(row["reason"])[: 100 - len(head)]
     return (
         f"{head}{row['i_set_a']:>8.1f}{row['v_set_pu'] * 100:>8.1f}"
         f"{row['z_set_ohm']:>8.1f}{_margin(row['margin']):>8}"

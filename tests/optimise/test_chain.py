@@ -22,7 +22,7 @@ from oracles.scalar_detector import as_front, decimals
 from openphase.optimise.certificate import two_sided, upper_bound
 from openphase.optimise.counts import Grid, corners_of
 from openphase.optimise.staircase import front_of
-from openphase.optimise.thresholds import Choice, choose
+from openphase.optimise.thresholds import Choice, Sample, choose
 
 Real = NDArray[np.float64]
 Events = tuple[Real, Real, Real]
@@ -76,15 +76,13 @@ def study(seed: int, margin: float) -> Outcome:
     rng = np.random.default_rng([51, seed])
     opens, false = breaks(rng, OPENS), harmless(rng, TRIALS)
     stiff = opens[0] / margin, opens[1] * margin, opens[2] / margin
-    choice = choose(
-        GRID,
-        corners_of(GRID, *opens),
-        corners_of(GRID, *stiff),
-        OPENS,
-        front_of(*false, as_front(false).scenario),
-        margin,
-        REFERENCE,
+    sample = Sample(
+        opens=corners_of(GRID, *opens),
+        stiff=corners_of(GRID, *stiff),
+        trials=OPENS,
+        front=front_of(*false, as_front(false).scenario),
     )
+    choice = choose(GRID, sample, margin, REFERENCE)
     assert choice is not None
     assert tripped(choice, false) == 0
     assert tripped(choice, opens) == choice.detected

@@ -19,7 +19,7 @@ from oracles.scalar_detector import (
 
 from openphase.optimise.counts import Corners, Grid, corners_of
 from openphase.optimise.staircase import Front, front_of
-from openphase.optimise.thresholds import Choice, allowed, choose
+from openphase.optimise.thresholds import Choice, Sample, allowed, choose
 
 REFERENCE = 0.5, 0.004, 0.6
 Instance = tuple[Grid, Events, Events, float]
@@ -54,16 +54,13 @@ def chosen(
     trials: int | None = None,
     only_v: int | None = None,
 ) -> Choice | None:
-    return choose(
-        grid,
-        corners_of(grid, *opens),
-        corners_of(grid, *stiffened(opens, margin)),
-        opens[0].size if trials is None else trials,
-        front(false),
-        margin,
-        REFERENCE,
-        only_v,
+    sample = Sample(
+        opens=corners_of(grid, *opens),
+        stiff=corners_of(grid, *stiffened(opens, margin)),
+        trials=opens[0].size if trials is None else trials,
+        front=front(false),
     )
+    return choose(grid, sample, margin, REFERENCE, only_v)
 
 
 def keeps(grid: Grid, false: Events, margin: float) -> NDArray[np.bool_]:
@@ -203,7 +200,8 @@ def test_inputs_stay_as_they_were() -> None:
     corners, edge = corners_of(grid, *opens), front(false)
     copy = Corners(cell=corners.cell.copy(), count=corners.count.copy())
     di1_a = edge.di1_a.copy()
-    choose(grid, corners, corners, opens[0].size, edge, margin, REFERENCE)
+    sample = Sample(opens=corners, stiff=corners, trials=opens[0].size, front=edge)
+    choose(grid, sample, margin, REFERENCE)
     np.testing.assert_array_equal(corners.cell, copy.cell)
     np.testing.assert_array_equal(corners.count, copy.count)
     np.testing.assert_array_equal(edge.di1_a, di1_a)

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+
 from openphase.model import dump_feeder, load_feeder
 from openphase.studies.cli import main
 

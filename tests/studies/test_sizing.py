@@ -17,7 +17,7 @@ from openphase.model import load_feeder
 from openphase.model.errors import OpenPhaseError
 from openphase.model.feeder_file import dump_feeder
 from openphase.studies import cli, sizing
-from openphase.studies.run.ledger import attempt_number
+from openphase.studies.run.ledger import enter, find_attempt
 from openphase.studies.run.spec import default_study, dump_study
 
 NOT_COMPARED = {"log.txt", "timing.json"}
@@ -297,11 +297,36 @@ def test_another_seed_starts_afresh_and_is_another_attempt(
     assert ledger(copy) == kept
 
 
-def test_the_ledger_counts_by_content_seed_and_size(tmp_path: Path) -> None:
+def test_the_ledger_counts_by_population_study_seed_and_size(tmp_path: Path) -> None:
     path = tmp_path / "deep" / "ledger.json"
-    tries = [("a", 1, 400), ("a", 2, 400), ("b", 1, 400), ("a", 1, 500), ("a", 2, 400)]
-    assert [attempt_number(path, *own) for own in tries] == [1, 2, 1, 3, 2]
-    assert attempt_number(path, "a", 1, 400) == 1
+    tries = [
+        ("a", "s", 1, 400),
+        ("a", "s", 2, 400),
+        ("b", "s", 1, 400),
+        ("a", "s", 1, 500),
+        ("a", "other demands", 1, 400),
+        ("a", "s", 2, 400),
+    ]
+    numbers = []
+    for own in tries:
+        attempt = find_attempt(path, *own)
+        numbers.append(attempt.number)
+        assert find_attempt(path, *own) == attempt  # looking writes nothing
+        enter(path, attempt)
+    assert numbers == [1, 2, 1, 3, 4, 2]
+
+
+def test_a_size_left_open_grows_with_the_attempt(tmp_path: Path) -> None:
+    path = tmp_path / "ledger.json"
+
+    def needed(attempt: int) -> int:
+        return 100 * attempt
+
+    for seed, number in ((1, 1), (2, 2), (1, 1), (2, 2)):
+        attempt = find_attempt(path, "a", "s", seed, needed)
+        assert (attempt.number, attempt.scenarios) == (number, 100 * number)
+        enter(path, attempt)
+    assert find_attempt(path, "a", "s", 2, 200).number == 2
 
 
 @pytest.mark.usefixtures("plain")
@@ -445,5 +470,6 @@ def test_an_unwritable_place_is_told_as_such(tmp_path: Path) -> None:
     said = size(tmp_path / "file" / "run")
     assert said.code == 1
     assert "file" in said.err
+    path = tmp_path / "file" / "ledger.json"
     with pytest.raises(OpenPhaseError):
-        attempt_number(tmp_path / "file" / "ledger.json", "a", 1, 1)
+        enter(path, find_attempt(path, "a", "s", 1, 1))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from openphase.model import InputError, load_feeder
 from openphase.studies.cli import main
 from openphase.studies.settings_file import read_settings
