@@ -22,7 +22,7 @@ from ..model.parts import Feeder
 from ..optimise.certificate import needed_trials, share_of_alpha
 from ..optimise.thresholds import Choice
 from .run.blocks import run_blocks
-from .run.certify import Validation, add_up, compared_rows, judged, section_row
+from .run.certify import NOT_BUILT, Validation, add_up, compared_rows, judged, section_row
 from .run.choose import Training, as_settings, choices, gather, more_blocks, planned_blocks
 from .run.classes import Purpose
 from .run.draw import BlockId, Case, make_case
@@ -214,7 +214,7 @@ def _certified(
         ],
         "feeder_false_trips": {
             "per_year_upper": None,
-            "assumptions": "not built yet: event classes have no rates per year",
+            "assumptions": list(NOT_BUILT),
         },
         "numerics": dict(
             zip(("dead", "floating", "not_converged"), validation.flags.tolist(), strict=True)

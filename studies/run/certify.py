@@ -19,7 +19,29 @@ from .classes import REPORTED, DrawClass, Purpose
 from .draw import BlockId, Case
 from .tally import Tested
 
-__all__ = ["COMPARED", "Validation", "add_up", "compared_rows", "judged", "section_row"]
+__all__ = [
+    "COMPARED",
+    "NOT_BUILT",
+    "Validation",
+    "add_up",
+    "compared_rows",
+    "judged",
+    "section_row",
+]
+
+#: what the certificate of this version does not cover
+NOT_BUILT = (
+    "Only the classes listed per terminal are drawn. Faults with intact conductors, regulator "
+    "taps, capacitor and motor switching, tie switching and transfer, PV, energisation and "
+    "reclosing are not: the bounds say nothing about them.",
+    "Ratio and angle errors of CTs and VTs, and clock errors, are not drawn: only the random "
+    "error stated above.",
+    "Rare false trips are sampled, not hunted.",
+    "ΔT and the operate delay are carried in the sheet, and not judged: one frame before the "
+    "event and one after it stand for all.",
+    "Event classes have no rates, so there are no false trips per year.",
+    "One setting group; each study has one state of its switches.",
+)
 
 COMPARED = ("chosen", "best at reference V_set", "reference")
 

@@ -46,7 +46,9 @@ def sheet_table(result: dict[str, Any]) -> str:
             f"beyond them cannot be seen: {blind or 'none'}."
         ),
         *_wrapped(
-            "bound: upper bound of the probability of a false trip in one event, worst class."
+            "bound: upper bound of the probability of a false trip in one event, worst class. "
+            "It covers load steps, source steps and breaks elsewhere; report.html says what it "
+            "does not cover."
         ),
         "",
         f"{'compared':<{wide}}{'':<23}{'I_set A':>8}{'V_set %':>8}{'Z_set Ω':>8}"
