@@ -14,6 +14,10 @@ from ...model.points import Terminal
 __all__ = ["REPORTED", "DrawClass", "Purpose", "ReportedClass", "Side", "sides"]
 
 
+Kind = Literal["must_trip", "must_not_trip", "apart"]
+SideName = Literal["inside", "outside"]
+
+
 class Purpose(IntEnum):
     """What a sample is for; part of its random stream, so append only."""
 
@@ -46,67 +50,29 @@ class ReportedClass:
     """A class as the certificate lists it."""
 
     name: str
-    kind: Literal["must_trip", "must_not_trip", "apart"]
-    side: Literal["inside", "outside"]
+    kind: Kind
+    side: SideName
     drawn: DrawClass
     where: tuple[Side, ...]
 
 
 INSIDE = (Side.PATH, Side.LATERAL)
 
-REPORTED = (
-    ReportedClass(
-        name="open_inside",
-        kind="must_trip",
-        side="inside",
-        drawn=DrawClass.OPEN_PHASE,
-        where=(Side.PATH,),
-    ),
-    ReportedClass(
-        name="load_step",
-        kind="must_not_trip",
-        side="inside",
-        drawn=DrawClass.LOAD_STEP,
-        where=INSIDE,
-    ),
-    ReportedClass(
-        name="load_step",
-        kind="must_not_trip",
-        side="outside",
-        drawn=DrawClass.LOAD_STEP,
-        where=(Side.OUTSIDE,),
-    ),
-    ReportedClass(
-        name="source_step",
-        kind="must_not_trip",
-        side="outside",
-        drawn=DrawClass.SOURCE_STEP,
-        where=(Side.OUTSIDE,),
-    ),
-    ReportedClass(
-        name="open_outside",
-        kind="must_not_trip",
-        side="outside",
-        drawn=DrawClass.OPEN_PHASE,
-        where=(Side.OUTSIDE,),
-    ),
-    ReportedClass(
-        name="open_lateral",
-        kind="apart",
-        side="inside",
-        drawn=DrawClass.OPEN_PHASE,
-        where=(Side.LATERAL,),
-    ),
-    ReportedClass(
-        name="open_three", kind="apart", side="inside", drawn=DrawClass.OPEN_THREE, where=INSIDE
-    ),
-    ReportedClass(
-        name="open_three",
-        kind="apart",
-        side="outside",
-        drawn=DrawClass.OPEN_THREE,
-        where=(Side.OUTSIDE,),
-    ),
+#: name, kind, side, how it is drawn, and where the event must stand
+_TABLE: tuple[tuple[str, Kind, SideName, DrawClass, tuple[Side, ...]], ...] = (
+    ("open_inside", "must_trip", "inside", DrawClass.OPEN_PHASE, (Side.PATH,)),
+    ("load_step", "must_not_trip", "inside", DrawClass.LOAD_STEP, INSIDE),
+    ("load_step", "must_not_trip", "outside", DrawClass.LOAD_STEP, (Side.OUTSIDE,)),
+    ("source_step", "must_not_trip", "outside", DrawClass.SOURCE_STEP, (Side.OUTSIDE,)),
+    ("open_outside", "must_not_trip", "outside", DrawClass.OPEN_PHASE, (Side.OUTSIDE,)),
+    ("open_lateral", "apart", "inside", DrawClass.OPEN_PHASE, (Side.LATERAL,)),
+    ("open_three", "apart", "inside", DrawClass.OPEN_THREE, INSIDE),
+    ("open_three", "apart", "outside", DrawClass.OPEN_THREE, (Side.OUTSIDE,)),
+)
+
+REPORTED = tuple(
+    ReportedClass(name=name, kind=kind, side=side, drawn=drawn, where=where)
+    for name, kind, side, drawn, where in _TABLE
 )
 
 
