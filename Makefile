@@ -13,6 +13,7 @@ CODE := pyproject.toml README.md LICENSE __init__.py py.typed \
 
 # Set it to choose an interpreter: make demo PYTHON=python3.13
 PYTHON ?=
+PYTHONS := $(or $(PYTHON),python3 python3.13 python3.12 python3.11 python3.14 python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -49,14 +50,14 @@ clean:
 # The first interpreter that is new enough and can make environments.
 $(VENV)/made:
 	@try='import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))'; \
-	for python in $(or $(PYTHON),python3 python3.13 python3.12 python3.11 python3.14 python); do \
+	for python in $(PYTHONS); do \
 		if "$$python" -c "$$try" >/dev/null 2>&1; then \
 			echo "Making $(VENV) with $$("$$python" --version)"; \
 			"$$python" -m venv --clear $(VENV) && touch $@; exit; \
 		fi; \
 	done; \
 	echo 'openphase needs Python 3.11 or later, with its venv module; none was found among:' >&2; \
-	echo '  $(or $(PYTHON),python3 python3.11 python3.12 python3.13 python3.14 python)' >&2; \
+	echo '  $(PYTHONS)' >&2; \
 	echo 'Install one (on Debian and Ubuntu: python3 and python3-venv), or name one:' >&2; \
 	echo '  make demo PYTHON=/path/to/python3' >&2; \
 	exit 1

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 
@@ -22,28 +24,42 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     nothing else is reordered, so one CPU type gives one result. Functions are folded
     into their callers: small ones on tuples would otherwise cost more than they compute.
     """
-    jit = numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=True)
-    return cast("Callable[P, R]", jit(function))
-
-
-def forget_stale_code(folder: Path) -> None:
-    """Drop machine code in ``folder`` that was compiled from other sources than today's.
-
-    The compiler's own check sees a function's file, not the files of the functions
-    folded into it: after an upgrade it would run yesterday's physics.
-    """
-    sources = sorted(folder.glob("*.py"))
-    digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()
-    stamp = folder / "__pycache__" / "compiled-from.txt"
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "fastmath": {"contract"},
+        "forceinline": True,
+    }
+    user_s, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _FOLDER or ""
     try:
-        if stamp.exists() and stamp.read_text(encoding="ascii") == digest:
-            return
-        for stale in stamp.parent.glob("*.nb[ic]"):
-            stale.unlink(missing_ok=True)
-        stamp.parent.mkdir(exist_ok=True)
-        stamp.write_text(digest, encoding="ascii")
-    except OSError:
-        return  # a read-only installation keeps no machine code here either
+        jit = numba.njit(cache=bool(_FOLDER), **options)(function)
+    finally:
+        numba.config.CACHE_DIR = user_s
+    return cast("Callable[P, R]", jit)
 
 
-forget_stale_code(Path(__file__).parent)
+def _code_folder() -> str:
+    """Where machine code of just these sources is kept; empty where nothing can be written.
+
+    The compiler's own check sees a function's file, not the files of the functions folded
+    into it: after an upgrade it would run yesterday's physics. So the folder's name is a
+    digest of all sources. It stands beside them, or in the user's cache.
+    """
+    package = Path(__file__).parent.parent
+    sources = sorted(p for room in ("model", "detector") for p in (package / room).rglob("*.py"))
+    digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()
+    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    places = [Path(__file__).parent / "__pycache__", Path(cache) / "openphase"]
+    if asked := os.environ.get("NUMBA_CACHE_DIR"):
+        places = [Path(asked)]
+    for place in places:
+        folder = place / f"machine-code-{digest[:16]}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return str(folder)
+        except OSError:
+            continue
+    return ""
+
+
+_FOLDER = _code_folder()

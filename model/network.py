@@ -46,7 +46,7 @@ class Network:
     """The compiled feeder. Edge k ends at node k; the chord, if any, is edge B."""
 
     tree: Tree
-    nodes: tuple[str, ...]  #: names: buses, and tees as LINE@FRACTION
+    nodes: tuple[str, ...]  #: names: buses, and tees as LINE:FRACTION
     pieces: tuple[Piece | None, ...]  #: of each edge; None: the source impedance
     upward: NDArray[np.bool_]  #: (edges,) the edge's upper end is the piece's first end
     length_km: NDArray[np.float64]  #: (edges,)
@@ -166,7 +166,8 @@ def compile_network(feeder: Feeder, closed: frozenset[str] | None = None) -> Net
 
 
 def _tee(line: str, fraction: float) -> str:
-    return f"{line}@{fraction:g}"
+    # no name may hold a colon, so no bus is called like a tee
+    return f"{line}:{fraction!r}"
 
 
 def _node_name(feeder: Feeder, place: Place) -> str:

@@ -17,6 +17,8 @@ __all__ = ["Front", "border", "front_of", "margins", "merge_fronts", "nearest"]
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
+CELLS = 1_000_000  #: factors looked at together; bounds memory
+
 BINS = 32  #: per goal, in the first pass that thins events out
 
 
@@ -157,8 +159,9 @@ def margins(front: Front, i_set_a: Real, v_set_pu: Real, z_set_ohm: Real) -> Rea
     infinite where no event could ever trip.
     """
     found = np.full(i_set_a.shape, np.inf)
-    for start in range(0, i_set_a.size, 4096):
-        part = slice(start, start + 4096)
+    step = max(CELLS // max(front.size, 1), 1)
+    for start in range(0, i_set_a.size, step):
+        part = slice(start, start + step)
         if front.size:
             each = factors(front, i_set_a[part], v_set_pu[part], z_set_ohm[part])
             found[part] = each.min(axis=0)

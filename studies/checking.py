@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import textwrap
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +17,11 @@ from ..model.parts import Feeder
 from ..model.points import Terminal, find_points
 from .run.spec import Study, check_study, default_study
 from .run.store import as_json
+from .show.sheet import PAGE, wrapped
 
 __all__ = ["check_command", "summary"]
+
+LONG_LIST = 16  #: columns in which a list of names may run on below itself
 
 
 def check_command(args: argparse.Namespace) -> int:
@@ -115,9 +120,7 @@ def _assumed(feeder: Feeder) -> list[str]:
         "downstream kW: nominal times the study's load range, at the section's far and near end",
     ]
     if any(line.z0_ohm_per_km == line.z1_ohm_per_km for line in feeder.lines):
-        said.append(
-            "some lines have z0 = z1 (given so, or left out): overhead lines have z0 ≈ 3 z1"
-        )
+        said.append("some lines have z0 = z1 (given so): overhead lines have z0 ≈ 3 z1")
     return said
 
 
@@ -134,20 +137,56 @@ def _plot(feeder: Feeder, path: Path) -> None:
 def _text(found: dict[str, Any]) -> str:
     """The summary for people, in 100 columns."""
     lines = [
-        f"{found['feeder']}: no faults; {found['kv_ll']:g} kV, {found['line_km']:g} km of line, "
-        f"{found['load_kw']:g} kW, {len(found['points'])} measuring points",
+        *wrapped(
+            f"{found['feeder']}: no faults; {found['kv_ll']:g} kV, {found['line_km']:g} km of "
+            f"line, {found['load_kw']:g} kW, {len(found['points'])} measuring points"
+        ),
         "",
-        f"{'section':<12}{'km':>6}{'|Z1| Ω':>9}{'downstream kW':>17}  {'Yg/D known':<14}"
-        f"{'Yg/D sampled':<14}inside",
+        *(_sections(found["sections"]) or ["no sections: nothing to size"]),
+        "",
+        *wrapped(f"ties, normally open: {', '.join(found['loop']) or 'none'}"),
+        "regulators: none",
+        "assumed:",
     ]
-    for row in found["sections"]:
-        low, high = row["downstream_kw"]
-        lines.append(
-            f"{row['local'] + '–' + row['remote']:<12}{row['length_km']:>6g}"
-            f"{abs(complex(*row['line_z1_ohm'])):>9.3f}{f'{low:.0f} .. {high:.0f}':>17}  "
-            f"{', '.join(row['yg_d']) or '-':<14}{', '.join(row['yg_d_sampled']) or '-':<14}"
-            f"{', '.join(row['units'] + row['switches']) or '-'}"
-        )
-    lines += ["", f"ties, normally open: {', '.join(found['loop']) or 'none'}", "regulators: none"]
-    lines += ["assumed:"] + [f"- {text}" for text in found["assumed"]]
+    for text in found["assumed"]:
+        lines += wrapped(f"- {text}")
     return "\n".join(lines) + "\n"
+
+
+def _sections(rows: list[dict[str, Any]]) -> list[str]:
+    """The table of the sections; none where there is no section."""
+    if not rows:
+        return []
+    cells = [["section", "km", "|Z1| Ω", "downstream kW", "Yg/D known", "Yg/D sampled", "inside"]]
+    for row in rows:
+        low, high = row["downstream_kw"]
+        cells.append(
+            [
+                f"{row['local']}–{row['remote']}",
+                f"{row['length_km']:g}",
+                f"{abs(complex(*row['line_z1_ohm'])):.3f}",
+                f"{low:.0f} .. {high:.0f}",
+                *(", ".join(row[key]) or "-" for key in ("yg_d", "yg_d_sampled")),
+                ", ".join(row["units"] + row["switches"]) or "-",
+            ]
+        )
+    wide = [max(len(line[n]) for line in cells) for n in range(7)]
+    # long names stand above their row, long lists run on below themselves
+    wide[4:6] = [min(w, LONG_LIST) for w in wide[4:6]]
+    beside = sum(wide[:6]) + 2 * 6 + min(wide[6], LONG_LIST) <= PAGE
+    if not beside:
+        wide[0] = 0
+    wide[6] = min(wide[6], PAGE - sum(wide[:6]) - 2 * 6)
+    lines = []
+    for name, *rest in cells:
+        if not beside:
+            lines += wrapped(name)
+        parts = [[name if beside else ""], *([text] for text in rest[:3])]
+        parts += [textwrap.wrap(text, w) for text, w in zip(rest[3:], wide[4:], strict=True)]
+        for own in zip_longest(*parts, fillvalue=""):
+            padded = (
+                f"{text:>{w}}" if n in (1, 2, 3) else f"{text:<{w}}"
+                for n, (text, w) in enumerate(zip(own, wide, strict=True))
+            )
+            lines.append("  ".join(padded).rstrip())
+    return lines

@@ -5,8 +5,11 @@ mistyped command answer at once.
 """
 
 import argparse
+import io
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -49,15 +52,33 @@ def main(argv: Sequence[str] | None = None) -> int:
     # The same bytes on any number of cores: how BLAS cuts a sum depends on its threads.
     for library in ("OMP", "OPENBLAS", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    _speak_utf8()
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _interrupt)
     try:
-        try:
-            return _answer(build_parser().parse_args(argv))
-        finally:
+        code = _answer(build_parser().parse_args(argv))
+        if sys.stdout:
             sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader (head, less) has left; keep the interpreter from complaining as it ends.
+        return code
+    except OSError as error:
+        # The reader (head, less) has left, or the answer has no room where it should go:
+        # keep the interpreter from complaining again as it ends.
+        if not isinstance(error, BrokenPipeError):
+            print(f"the answer cannot be written: {error.strerror or error}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
+
+
+def _interrupt(*_: object) -> None:
+    """End on a polite kill as on Ctrl-C: workers are stopped, the run resumes."""
+    raise KeyboardInterrupt
+
+
+def _speak_utf8() -> None:
+    """Answers and messages are UTF-8, whatever the locale says: they hold Δ, Ω and → ."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding="utf-8")
 
 
 def _answer(args: argparse.Namespace) -> int:

@@ -34,7 +34,10 @@ def read_settings(path: Path, feeder: Feeder) -> dict[tuple[str, str], Settings 
     except UnicodeDecodeError as error:
         raise InputError.single(str(path), "", None, "must be UTF-8 text") from error
     except (OSError, csv.Error) as error:
-        raise InputError.single(str(path), "", str(error), "must be a CSV file to read") from error
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError.single(str(path), "", reason, "must be a CSV file to read") from error
+    if len(columns) == 1 and ";" in columns[0]:
+        raise InputError([_fault(path, 1, "columns", "must be separated by commas", "semicolons")])
     missing = [name for name in ("local", "remote", *NUMBERS) if name not in columns]
     if missing:
         raise InputError(_fault(path, 1, f"column {n}", "must be in the sheet") for n in missing)
@@ -45,6 +48,8 @@ def read_settings(path: Path, feeder: Feeder) -> dict[tuple[str, str], Settings 
     for line, row in enumerate(rows, start=2):
         pair = (row["local"] or "", row["remote"] or "")
         name = "→".join(pair)
+        own, wrong = _settings(row)
+        faults += [_fault(path, line, f"{name}: {key}", *fault) for key, *fault in wrong]
         if pair not in pairs:
             hint = did_you_mean(name, ["→".join(p) for p in sorted(pairs)])
             wanted = f"must be a terminal of '{feeder.name}'{hint}"
@@ -52,11 +57,7 @@ def read_settings(path: Path, feeder: Feeder) -> dict[tuple[str, str], Settings 
         elif pair in found:
             faults.append(_fault(path, line, "each terminal", "must stand in one row", name))
         else:
-            found[pair], wrong = _settings(row)
-            faults += [
-                _fault(path, line, f"{name}: {key}", "must be a number > 0", repr(text))
-                for key, text in wrong
-            ]
+            found[pair] = own
     if faults:
         raise InputError(faults)
     return found
@@ -66,20 +67,24 @@ def _fault(path: Path, line: int, where: str, wanted: str, found: str | None = N
     return Fault(source=str(path), line=line, where=where, wanted=wanted, found=found)
 
 
-def _settings(row: dict[str, str]) -> tuple[Settings | None, list[tuple[str, str]]]:
-    """A row's settings, None where all are empty; and the columns that hold no number > 0."""
+def _settings(row: dict[str, str]) -> tuple[Settings | None, list[tuple[str, str, str]]]:
+    """A row's settings, None where all are empty; and each fault as column, rule, text."""
     texts = {name: (row[name] or "").strip() for name in NUMBERS}
     if not any(texts.values()):
         return None, []
-    wrong = [(name, text) for name, text in texts.items() if not _positive(text)]
-    if wrong:
-        return None, wrong
-    i_set_a, v_set_pu, z_set_ohm = (float(text) for text in texts.values())
-    return Settings(i_set_a=i_set_a, v_set_pu=v_set_pu, z_set_ohm=z_set_ohm), []
+    numbers = {name: _number(text) for name, text in texts.items()}
+    wrong = [
+        (name, "must be a number > 0", repr(texts[name]))
+        for name, number in numbers.items()
+        if not 0.0 < number < math.inf
+    ]
+    if 1.0 < numbers["v_set_pu"] < math.inf:
+        wrong.append(("v_set_pu", "must be <= 1, per unit and not percent", texts["v_set_pu"]))
+    return (None if wrong else Settings(**numbers)), wrong
 
 
-def _positive(text: str) -> bool:
+def _number(text: str) -> float:
     try:
-        return 0.0 < float(text) < math.inf
+        return float(text)
     except ValueError:
-        return False
+        return math.nan

@@ -9,7 +9,7 @@ import math
 import platform
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,8 @@ from ..detector.criteria import Settings
 from ..model.errors import InputError, OpenPhaseError
 from ..model.feeder_file import dump_feeder, load_feeder
 from ..model.parts import Feeder
+from ..model.toml_file import read_text
+from ..model.toml_lines import locator
 from ..optimise.certificate import needed_trials, share_of_alpha
 from ..optimise.thresholds import Choice
 from .run.blocks import run_blocks
@@ -27,7 +29,7 @@ from .run.choose import Training, as_settings, choices, gather, more_blocks, pla
 from .run.classes import Purpose
 from .run.draw import BlockId, Case, make_case
 from .run.engine import BLOCK
-from .run.ledger import Attempt, enter, find_attempt
+from .run.ledger import Attempt, find_attempt, reserve
 from .run.spec import (
     Study,
     check_study,
@@ -36,7 +38,7 @@ from .run.spec import (
     dump_study,
     read_study,
 )
-from .run.store import RunFolder, as_json
+from .run.store import RunFolder, as_json, npz, pack
 from .run.tally import Tested, Trained, device_grid, judge_block, train_block
 from .show.report import write_report
 from .show.sheet import settings_csv, sheet_table
@@ -74,8 +76,12 @@ def say(text: str) -> None:
 def size_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code."""
     feeder = load_feeder(args.feeder)
-    study = read_study(args.study) if args.study else default_study(args.feeder)
-    check_study(study, feeder, str(args.study or "study.toml"))
+    if args.study:
+        study = read_study(args.study)
+        check_study(study, feeder, str(args.study), locator(read_text(args.study)))
+    else:
+        study = default_study(args.feeder)
+        check_study(study, feeder, "the default study")
     if not feeder.sections:
         raise InputError.single(feeder.name, "sections", "none", "must name at least one section")
     out = args.out or Path("runs") / feeder.name
@@ -117,24 +123,23 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     """
     case = make_case(feeder, study)
     book = out.resolve().parent / "ledger.json"
-    attempt = find_attempt(
-        book,
-        digest(dump_feeder(feeder), dump_population(study)),
+    entry = (
+        population_digest(feeder, study),
         digest(dump_study(study)),
         demand.seed,
         demand.scenarios or functools.partial(_default_scenarios, case),
     )
-    manifest = _manifest(feeder, study, attempt)
     folder = RunFolder(out)
-    train = planned_blocks(case, Purpose.TRAIN, attempt)
-    _announce(case, folder, folder.finds(manifest), train, attempt, demand)
-    folder.begin(manifest)
-    enter(book, attempt)
+    likely = find_attempt(book, *entry)
+    _announce(case, folder, _manifest(feeder, study, likely), likely, demand)
+    attempt = reserve(book, *entry)
+    folder.begin(_manifest(feeder, study, attempt))
     folder.write("study.toml", dump_study(study))
     folder.log(
         f"size {feeder.name}, seed {attempt.seed}, attempt {attempt.number}, n {attempt.scenarios}"
     )
     watch = Watch()
+    train = planned_blocks(case, Purpose.TRAIN, attempt)
     training = _train(case, train, folder, demand.jobs, attempt.scenarios)
     watch.lap("train_s")
     chosen = choices(case, device_grid(case), training)
@@ -156,10 +161,21 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     sizing = Sizing(result=answer, case=case, training=training, validation=validation)
     folder.write("result.json", as_json(answer))
     folder.write("settings.csv", settings_csv(answer))
+    folder.write("counts.npz", _counts(case, training))
     write_report(sizing.result, case, training.front, validation, folder)
     watch.lap("report_s")
     folder.write("timing.json", as_json(watch.laps))
     return sizing
+
+
+def _counts(case: Case, training: Training) -> bytes:
+    """What training knows of every representable setting, as sparse histograms per terminal."""
+    grid = device_grid(case)
+    arrays = pack(grid, "grid")
+    for t, terminal in enumerate(case.points.terminals):
+        if not terminal.load_side:
+            arrays |= pack(training.opens[t], f"{t}.opens") | pack(training.false[t], f"{t}.false")
+    return npz(arrays)
 
 
 class Watch:
@@ -265,8 +281,7 @@ def _default_scenarios(case: Case, attempt: int) -> int:
 def _announce(
     case: Case,
     folder: RunFolder,
-    found: str,
-    train: list[BlockId],
+    manifest: dict[str, object],
     attempt: Attempt,
     demand: Demand,
 ) -> None:
@@ -276,7 +291,9 @@ def _announce(
         f"{judged(case.points.terminals)} to judge; {attempt.scenarios:,} scenarios per class "
         f"and side at least, attempt {attempt.number}"
     )
+    found = folder.finds(manifest)
     there = folder.count_blocks() if found == "this run" else 0
+    train = planned_blocks(case, Purpose.TRAIN, attempt)
     if found == "another run":
         say(f"{folder.path}: inputs have changed since the last run; starting afresh")
     elif there:
@@ -303,6 +320,17 @@ def _span(seconds: float) -> str:
 def digest(*texts: str) -> str:
     """SHA-256 of texts."""
     return hashlib.sha256("\0".join(texts).encode("utf-8")).hexdigest()
+
+
+def population_digest(feeder: Feeder, study: Study) -> str:
+    """SHA-256 of what decides which scenarios there are, however it is written or called."""
+    closed = study.network.closed
+    if closed is None:
+        closed = tuple(switch.name for switch in feeder.switches if switch.closed)
+    state = replace(study.network, closed=tuple(sorted(closed)))
+    return digest(
+        dump_feeder(replace(feeder, name="any")), dump_population(replace(study, network=state))
+    )
 
 
 def code_digest() -> str:

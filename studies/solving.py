@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from ..detector.evidence import Phasors, evidence_of
 from ..detector.impedance import connection_impedance
 from ..detector.superimpose import compensated, positive_sequence
 from ..model.breaks import FLOATING, UNDEFINED
-from ..model.errors import InputError, OpenPhaseError, Report
+from ..model.errors import Fault, InputError, OpenPhaseError, Report
 from ..model.feeder_file import load_feeder
 from ..model.fields import did_you_mean
 from ..model.network import Network, compile_network, locate
@@ -29,6 +30,7 @@ from .settings_file import read_settings
 __all__ = ["Break", "parse_break", "solve_break", "solve_command"]
 
 Complex = NDArray[np.complex128]
+T = TypeVar("T")
 
 #: without a sheet, every terminal has the paper's settings
 DEFAULTS = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0)
@@ -48,13 +50,38 @@ class Break:
 def solve_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code."""
     feeder = load_feeder(args.feeder)
-    broken = parse_break(args.open, feeder)
-    closed = _closed(args.close, feeder)
-    settings = read_settings(args.settings, feeder) if args.settings else None
+    broken, closed, settings = _read_all(args, feeder)
     print("solving; the solver is compiled at first use …", file=sys.stderr, flush=True)
     answer = solve_break(feeder, broken, closed, settings)
     print(as_json(answer) if args.json else _table(feeder, broken, answer), end="")
     return 0
+
+
+def _read_all(
+    args: argparse.Namespace, feeder: Feeder
+) -> tuple[Break, frozenset[str], dict[tuple[str, str], Settings | None] | None]:
+    """Break, closed switches and settings; the faults of all three at once."""
+    faults: list[Fault] = []
+
+    def read(reader: Callable[[], T]) -> T | None:
+        try:
+            return reader()
+        except InputError as error:
+            faults.extend(error.faults)
+            return None
+
+    broken = read(lambda: parse_break(args.open, feeder))
+    closed = read(lambda: _closed(args.close, feeder))
+    sheet = read(lambda: read_settings(args.settings, feeder)) if args.settings else None
+    if faults or broken is None or closed is None:
+        raise InputError(faults)
+    return broken, closed, sheet
+
+
+def _one_of(what: str, name: str, known: list[str], feeder: Feeder) -> str:
+    """The rule that a name breaks, with what it could be."""
+    names = f": {', '.join(known)}" if len(known) <= 12 else ""
+    return f"must be a {what} of '{feeder.name}'{names}{did_you_mean(name, known)}"
 
 
 def parse_break(text: str, feeder: Feeder) -> Break:
@@ -66,7 +93,7 @@ def parse_break(text: str, feeder: Feeder) -> Break:
     line, fraction_text, phases = parts
     names = [item.name for item in feeder.lines]
     if line not in names:
-        report.add(("line",), f"must be a line of '{feeder.name}'{did_you_mean(line, names)}", line)
+        report.add(("line",), _one_of("line", line, names, feeder), line)
     try:
         fraction = float(fraction_text)
     except ValueError:
@@ -88,7 +115,7 @@ def _closed(names: list[str], feeder: Feeder) -> frozenset[str]:
     report = Report(source="--close", document={})
     for name in names:
         if name not in known:
-            report.add((name,), f"must be a switch of '{feeder.name}'{did_you_mean(name, known)}")
+            report.add(("name",), _one_of("switch", name, known, feeder), name)
     report.raise_if_any()
     return frozenset(s.name for s in feeder.switches if s.closed) | frozenset(names)
 
@@ -112,6 +139,8 @@ def solve_break(
     after = solve(network, opened, start=before.unit_v_pu)
     if (before.flags[0] | after.flags[0]) & NOT_CONVERGED:
         raise OpenPhaseError(f"{feeder.name}: voltage-dependent loads did not settle")
+    if not all(np.isfinite(part).all() for part in (before.v, before.i, after.v, after.i)):
+        raise OpenPhaseError(f"{feeder.name}: no finite solution; look for absurd values")
     lost = _lost_phases(broken, int(after.flags[0]))
     dark = _below(network, edge)
     buses = {}

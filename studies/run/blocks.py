@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+import threading
+import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
@@ -58,5 +63,33 @@ def _compute(compute: Callable[[BlockId], T], missing: Sequence[BlockId], jobs: 
     if jobs == 1:
         yield from (compute(which) for which in missing)
         return
-    parallel = Parallel(n_jobs=jobs, return_as="generator", pre_dispatch="4 * n_jobs")
-    yield from parallel(delayed(compute)(which) for which in missing)
+    parallel = Parallel(
+        n_jobs=jobs,
+        return_as="generator",
+        pre_dispatch="4 * n_jobs",
+        initializer=_follow_the_parent,
+        initargs=(os.getpid(),),
+    )
+    results = parallel(delayed(compute)(which) for which in missing)
+    try:
+        yield from results
+    except BaseException:
+        # the run is over; the pool's own thread may still stumble over what is cancelled here
+        threading.excepthook = lambda _: None
+        raise
+    finally:
+        with warnings.catch_warnings():  # an interrupted run need not be told what it left undone
+            warnings.simplefilter("ignore")
+            results.close()
+
+
+def _follow_the_parent(parent: int) -> None:
+    """A worker leaves interrupts to its parent, and ends when the parent has been killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

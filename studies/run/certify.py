@@ -17,6 +17,7 @@ from ...optimise.staircase import Front, merge_fronts, nearest
 from ...optimise.thresholds import Choice
 from .classes import REPORTED, DrawClass, Purpose
 from .draw import BlockId, Case
+from .spec import Study
 from .tally import Tested
 
 __all__ = [
@@ -43,10 +44,19 @@ NOT_BUILT = (
     "One setting group; each study has one state of its switches.",
 )
 
-COMPARED = ("chosen", "best at reference V_set", "reference")
+BEST_AT_REFERENCE = "best at reference V_set"
+COMPARED = ("chosen", BEST_AT_REFERENCE, "reference")
 
 #: the criteria in the order in which a verdict names the first that fails
 CAUSES = (Reason.BLOCKED, Reason.CURRENT, Reason.VOLTAGE, Reason.IMPEDANCE, Reason.SIGN)
+
+#: the classes that must not trip, as a reason names them
+WORDS = {
+    ("load_step", "inside"): "load steps inside",
+    ("load_step", "outside"): "load steps outside",
+    ("source_step", "outside"): "source steps",
+    ("open_outside", "outside"): "breaks elsewhere",
+}
 
 FEW_EFFECTIVE = 0.1  #: below this share of effective trials, zero trips show little
 
@@ -124,7 +134,7 @@ def section_row(
         "status": "",
         "reason": "",
         "i_set_a": choice.i_set_a if choice else None,
-        "i_set_pu": choice.i_set_a / study.device.ct_primary_a if choice else None,
+        "i_set_pu": round(choice.i_set_a / study.device.ct_primary_a, 10) if choice else None,
         "v_set_pu": choice.v_set_pu if choice else None,
         "z_set_ohm": choice.z_set_ohm if choice else None,
         "dt_ms": study.detector.dt_ms,
@@ -238,8 +248,8 @@ def _status(
         front = front.where(of_worst) if of_worst.any() else front
         n, _ = nearest(front, row["i_set_a"], row["v_set_pu"], row["z_set_ohm"])
         return "not_certified", (
-            f"{worst['trips']} false trips of {worst['trials']} in {worst['name']} "
-            f"{worst['side']}; worst scenario "
+            f"{worst['trips']} false trip{'s' if worst['trips'] > 1 else ''} of "
+            f"{worst['trials']} in {_words(worst)}; worst scenario "
             f"{scenario_name(Purpose.VALIDATE, attempt, front.scenario[n])}; "
             "this sample is spent: run again with a new --seed"
         )
@@ -249,12 +259,11 @@ def _status(
             f"target {demand.target:.2g}: too few scenarios"
         )
     hollow = [
-        f"{own['name']} {own['side']}"
-        for own in must_not
-        if own["effective_trials"] < FEW_EFFECTIVE * own["trials"]
+        _words(own) for own in must_not if own["effective_trials"] < FEW_EFFECTIVE * own["trials"]
     ]
     note = (
-        f"; few of {', '.join(hollow)} come near the thresholds: their zero is weak evidence"
+        f"; few of the {' and '.join(filter(None, [', '.join(hollow[:-1]), hollow[-1]]))} "
+        "come near the thresholds: their zero is weak evidence"
         if hollow
         else ""
     )
@@ -264,6 +273,11 @@ def _status(
     return "weak", (
         f"no false trip, but finds only {sure:.3f} for sure, {demand.find_at_least:g} wanted{note}"
     )
+
+
+def _words(own: dict[str, Any]) -> str:
+    """A class and its side in words."""
+    return WORDS[own["name"], own["side"]]
 
 
 def compared_rows(
@@ -280,8 +294,9 @@ def compared_rows(
     )
     must_not = [r for r, own in enumerate(REPORTED) if own.kind == "must_not_trip"]
     rows = []
+    opens, reachable = int(validation.trials[0, t]), int(validation.reachable[t])
     for k, own in enumerate(settings):
-        reachable, found = int(validation.reachable[t]), int(validation.found[k, t])
+        found = int(validation.found[k, t])
         low, high = two_sided(found, reachable, alpha)
         bounds = [
             upper_bound(int(validation.trips[k, r, t]), int(validation.trials[r, t]), alpha)
@@ -297,12 +312,25 @@ def compared_rows(
                 "v_set_pu": own.v_set_pu if own else None,
                 "z_set_ohm": own.z_set_ohm if own else None,
                 "detected": found if own else None,
-                "opens": reachable,
+                "opens": opens,
+                "unreachable": opens - reachable,
                 "dependability_low": low if own else None,
                 "dependability_high": high if own else None,
                 "false_trips": int(validation.trips[k, must_not, t].sum()) if own else None,
                 "trials": int(validation.trials[must_not, t].sum()),
                 "upper": max(bounds, default=1.0) if own else None,
+                "reason": None if own else _missing(case.study, COMPARED[k]),
             }
         )
     return rows
+
+
+def _missing(study: Study, name: str) -> str:
+    """Why there is no setting of this name to compare."""
+    margin = f"keeps the margin {study.certificate.margin:g}"
+    if name != BEST_AT_REFERENCE:
+        return f"no setting {margin}"
+    wanted = study.reference.v_set_pct
+    if not np.isclose(study.device.v_grid_pu(), wanted / 100.0).any():
+        return f"the device has no V_set of {wanted:.10g} %"
+    return f"no setting with V_set {wanted:.10g} % {margin}"

@@ -9,14 +9,18 @@ validation sample until it shows no false trip. Repeating a run keeps its number
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from ...model.errors import OpenPhaseError
 from .store import as_json, write_whole
 
-__all__ = ["Attempt", "enter", "find_attempt"]
+__all__ = ["Attempt", "find_attempt", "reserve"]
+
+LOCK_TRIES, LOCK_WAIT_S = 100, 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,15 +53,41 @@ def find_attempt(
     )
 
 
-def enter(path: Path, attempt: Attempt) -> None:
-    """Write an attempt into the ledger, unless it is there."""
-    ledger = _read(path)
-    entries = ledger.setdefault(attempt.population, [])
-    if attempt.number > len(entries):
-        entries.append(
-            {"study": attempt.study, "seed": attempt.seed, "scenarios": attempt.scenarios}
-        )
-        write_whole(path, as_json(ledger).encode("utf-8"))
+def reserve(
+    path: Path, population: str, study: str, seed: int, size: int | Callable[[int], int]
+) -> Attempt:
+    """Find the attempt and write it into the ledger, so that no other run gets its number."""
+    with _locked(path):
+        attempt = find_attempt(path, population, study, seed, size)
+        ledger = _read(path)
+        entries = ledger.setdefault(population, [])
+        if attempt.number > len(entries):
+            entries.append({"study": study, "seed": seed, "scenarios": attempt.scenarios})
+            write_whole(path, as_json(ledger).encode("utf-8"))
+    return attempt
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Keep other runs from the ledger for the moment it takes to write it."""
+    lock = path.with_name(path.name + ".lock")
+    for _ in range(LOCK_TRIES):
+        try:
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            lock.touch(exist_ok=False)
+            break
+        except FileExistsError:
+            if not lock.is_file():
+                raise OpenPhaseError(f"{path.parent}: must be a folder") from None
+            time.sleep(LOCK_WAIT_S)
+        except OSError as error:
+            raise OpenPhaseError(f"{path}: {error.strerror or error}") from error
+    else:
+        raise OpenPhaseError(f"{lock}: another run holds the ledger; remove it if there is none")
+    try:
+        yield
+    finally:
+        lock.unlink(missing_ok=True)
 
 
 def _read(path: Path) -> dict[str, list[dict[str, object]]]:
@@ -66,7 +96,9 @@ def _read(path: Path) -> dict[str, list[dict[str, object]]]:
         ledger = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise OpenPhaseError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
         raise OpenPhaseError(f"{path}: is no ledger of openphase: {error}") from error
     entries = list(ledger.values()) if isinstance(ledger, dict) else [None]
     if not all(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import model
-from ...model.errors import InputError, KeyPath, Report
+from ...model.errors import InputError, KeyPath, Locator, Report
 from ...model.feeder_file import shipped_feeders
 from ...model.fields import as_toml, did_you_mean
 from ...model.parts import Feeder
@@ -104,7 +104,9 @@ def default_study(feeder_name: str) -> Study:
     return study_from_toml(file.read_text(encoding="utf-8"), file.name)
 
 
-def check_study(study: Study, feeder: Feeder, source_name: str) -> None:
+def check_study(
+    study: Study, feeder: Feeder, source_name: str, locate: Locator | None = None
+) -> None:
     """Check a study by itself, and its names against the feeder.
 
     A study that was made in a program passes the same checks here as one that was read.
@@ -115,6 +117,8 @@ def check_study(study: Study, feeder: Feeder, source_name: str) -> None:
         The two that are to go together.
     source_name
         Begins each message: the study's file, or whatever else it came from.
+    locate
+        Gives the lines of the study's file, where there is one.
 
     Raises
     ------
@@ -122,6 +126,8 @@ def check_study(study: Study, feeder: Feeder, source_name: str) -> None:
         With every fault.
     """
     report = Report(source=source_name, document=_document(study))
+    if locate is not None:
+        report.locate = locate
     _study(report)
     _check_transformers(study.transformers.yg_d, feeder, report)
     _check_switches(study.network.closed or (), feeder, report)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import typing
 import zipfile
 from dataclasses import fields, is_dataclass
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...model.errors import OpenPhaseError
 
-__all__ = ["RunFolder", "as_json", "pack", "unpack", "write_whole"]
+__all__ = ["RunFolder", "as_json", "npz", "pack", "unpack", "write_whole"]
 
 T = TypeVar("T")
 
@@ -40,7 +41,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
     Raises OpenPhaseError where the folder cannot be written or the disk is full.
     """
-    part = path.with_name(path.name + ".part")
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_bytes(content)
@@ -67,6 +68,13 @@ def pack(value: Any, name: str = "") -> dict[str, NDArray[Any]]:
     for key, item in parts:
         flat |= pack(item, f"{name}.{key}" if name else key)
     return flat
+
+
+def npz(arrays: dict[str, NDArray[Any]]) -> bytes:
+    """Named arrays as the bytes of an npz file; equal arrays give equal bytes."""
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)  # type: ignore[arg-type]
+    return buffer.getvalue()
 
 
 def unpack(kind: type[T], flat: dict[str, NDArray[Any]], name: str = "") -> T:
@@ -96,6 +104,7 @@ OWN = (
     "study.toml",
     "result.json",
     "settings.csv",
+    "counts.npz",
     "report.html",
     "timing.json",
     "log.txt",
@@ -159,8 +168,13 @@ class RunFolder:
 
     def log(self, line: str) -> None:
         """Append a line to log.txt."""
-        with (self.path / "log.txt").open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
+        path = self.path / "log.txt"
+        try:
+            with path.open("a", encoding="utf-8") as file:
+                file.write(line + "\n")
+        except OSError as error:
+            message = f"{path}: cannot be written: {error.strerror or error}"
+            raise OpenPhaseError(message) from error
 
     def block(self, name: str, kind: type[T]) -> T | None:
         """A block that is there already, else None; a damaged one counts as not there."""
@@ -173,6 +187,4 @@ class RunFolder:
 
     def keep_block(self, name: str, value: object) -> None:
         """Store a block."""
-        buffer = io.BytesIO()
-        np.savez(buffer, **pack(value))  # type: ignore[arg-type]
-        write_whole(self.blocks / f"{name}.npz", buffer.getvalue())
+        write_whole(self.blocks / f"{name}.npz", npz(pack(value)))

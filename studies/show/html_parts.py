@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
+from .sheet import setting_text
+
 __all__ = [
     "bound_text",
     "bullets",
@@ -18,19 +20,13 @@ __all__ = [
     "interval_text",
     "k_of_n",
     "margin_text",
-    "number_cell",
     "percent",
     "picture",
     "range_text",
     "right_cell",
+    "setting_cell",
     "table",
-    "terminal_name",
 ]
-
-
-def terminal_name(row: dict[str, Any]) -> str:
-    """The terminal a row of the result speaks of."""
-    return escape(f"{row['local']}→{row['remote']}")
 
 
 def table(head: Iterable[str], rows: Iterable[str], kind: str = "") -> str:
@@ -63,9 +59,9 @@ def right_cell(text: str) -> str:
     return f'<td class="n">{escape(text)}</td>'
 
 
-def number_cell(value: float | None, form: str, factor: float = 1.0) -> str:
-    """A cell with ``value`` times ``factor`` in this format; a dash for None."""
-    return right_cell("–" if value is None else form.format(value * factor))
+def setting_cell(value: float | None, factor: float = 1.0) -> str:
+    """A cell with the setting ``value`` times ``factor``; a dash for None."""
+    return right_cell("–" if value is None else setting_text(value * factor))
 
 
 def false_trips_cell(k: int | None, n: int | None) -> str:
@@ -118,7 +114,7 @@ def interval_text(low: float, high: float) -> str:
 
 def range_text(ends: tuple[float, float]) -> str:
     """The two ends of a range."""
-    return f"{ends[0]:g} to {ends[1]:g}"
+    return f"{setting_text(ends[0])} to {setting_text(ends[1])}"
 
 
 def ends(grid: tuple[float, ...]) -> tuple[float, float]:

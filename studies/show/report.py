@@ -22,14 +22,14 @@ from .html_parts import (
     interval_text,
     k_of_n,
     margin_text,
-    number_cell,
     percent,
     picture,
     range_text,
     right_cell,
+    setting_cell,
     table,
-    terminal_name,
 )
+from .sheet import setting_text, terminal_name
 from .views import evidence_view, overview_view, profile_view
 
 __all__ = ["report_html", "write_report"]
@@ -185,13 +185,13 @@ def _sheet(result: dict[str, Any]) -> str:
     rows = []
     for row in result["sections"]:
         cells = [
-            f'<th class="w">{terminal_name(row)}</th>',
+            f'<th class="w">{escape(terminal_name(row))}</th>',
             f'<td class="w">{escape(row["status"])}</td>',
         ]
         cells += [
-            number_cell(row["i_set_a"], "{:.1f}"),
-            number_cell(row["v_set_pu"], "{:.1f}", 100.0),
-            number_cell(row["z_set_ohm"], "{:.1f}"),
+            setting_cell(row["i_set_a"]),
+            setting_cell(row["v_set_pu"], 100.0),
+            setting_cell(row["z_set_ohm"]),
             right_cell(margin_text(row)),
             right_cell(dependability_text(row)),
             right_cell(k_of_n(row["unreachable"], row["opens"])),
@@ -217,17 +217,19 @@ def _comparison(result: dict[str, Any], pictures: dict[str, bytes]) -> str:
     )  # fmt: skip
     rows = []
     for row in result["compared"]:
-        low, high = row["dependability_low"], row["dependability_high"]
         cells = [
-            f'<th class="w">{terminal_name(row)}</th>',
+            f'<th class="w">{escape(terminal_name(row))}</th>',
             f'<td class="w">{escape(row["name"])}</td>',
         ]
+        if row["i_set_a"] is None:
+            rows.append("".join([*cells, f'<td colspan="7">{escape(row["reason"])}</td>']))
+            continue
         cells += [
-            number_cell(row["i_set_a"], "{:.1f}"),
-            number_cell(row["v_set_pu"], "{:.1f}", 100.0),
-            number_cell(row["z_set_ohm"], "{:.1f}"),
-            right_cell(k_of_n(row["detected"], row["opens"])),
-            right_cell("–" if low is None else interval_text(low, high)),
+            setting_cell(row["i_set_a"]),
+            setting_cell(row["v_set_pu"], 100.0),
+            setting_cell(row["z_set_ohm"]),
+            right_cell(k_of_n(row["detected"], row["opens"] - row["unreachable"])),
+            right_cell(interval_text(row["dependability_low"], row["dependability_high"])),
             false_trips_cell(row["false_trips"], row["trials"]),
             right_cell(bound_text(row["upper"])),
         ]
@@ -261,7 +263,7 @@ def _terminal(t: int, row: dict[str, Any], study: Study, pictures: dict[str, byt
     return "\n".join(
         [
             '<section class="terminal">',
-            f"<h2>Terminal {terminal_name(row)}: {escape(row['status'])}</h2>",
+            f"<h2>Terminal {escape(terminal_name(row))}: {escape(row['status'])}</h2>",
             f"<p>{_setting(row)} Line between the points: |Z1| = {abs(z1):.2f} Ω.</p>",
             f"<p>{escape(row['reason'][:1].upper() + row['reason'][1:])}.</p>",
             table(head, rows),
@@ -294,8 +296,9 @@ def _setting(row: dict[str, Any]) -> str:
     if row["i_set_a"] is None:
         return "No setting."
     return (
-        f"I_set {row['i_set_a']:g} A ({row['i_set_pu']:g} pu), V_set {row['v_set_pu'] * 100:g} %, "
-        f"Z_set {row['z_set_ohm']:g} Ω, margin {margin_text(row)}."
+        f"I_set {setting_text(row['i_set_a'])} A ({setting_text(row['i_set_pu'])} pu), "
+        f"V_set {setting_text(row['v_set_pu'] * 100.0)} %, "
+        f"Z_set {setting_text(row['z_set_ohm'])} Ω, margin {margin_text(row)}."
     )
 
 
@@ -354,7 +357,7 @@ def _assumptions(result: dict[str, Any], study: Study) -> str:
         f"in length, {percent(study.open_phase.two_phase_share, 0)} of them two phases, else one.",
         f"Device: I_set {range_text(ends(study.device.i_grid()))} A, Z_set "
         f"{range_text(ends(study.device.z_grid()))} Ω, V_set "
-        f"{', '.join(f'{v:g}' for v in study.device.v_set_pct)} %; sign of Re Z1 "
+        f"{', '.join(map(setting_text, study.device.v_set_pct))} %; sign of Re Z1 "
         f"{'used' if study.detector.negative_sign else 'not used'}.",
     ]
     solved = (

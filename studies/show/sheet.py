@@ -4,10 +4,39 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["settings_csv", "sheet_table"]
+__all__ = [
+    "PAGE",
+    "setting_text",
+    "settings_csv",
+    "sheet_table",
+    "table_lines",
+    "terminal_name",
+    "wrapped",
+]
+
+PAGE = 100  #: columns of everything that is printed for people
+GAP = "  "
+
+
+def terminal_name(row: dict[str, Any]) -> str:
+    """The terminal a row of the result speaks of, as ``Terminal.name`` has it."""
+    return f"{row['local']}→{row['remote']}"
+
+
+def setting_text(value: float) -> str:
+    """A setting exactly as the device holds it: the shortest decimal, without float dust.
+
+    Examples
+    --------
+    >>> setting_text(0.15), setting_text(0.05 * 100.0), setting_text(0.1 + 0.2)
+    ('0.15', '5', '0.3')
+    """
+    return f"{value:.10g}"
 
 
 def settings_csv(result: dict[str, Any]) -> str:
@@ -24,74 +53,138 @@ def settings_csv(result: dict[str, Any]) -> str:
 
 
 def sheet_table(result: dict[str, Any]) -> str:
-    """The sheet in at most 100 columns, and the comparison under it."""
-    wide = max(8, *(len(_name(row)) for row in result["sections"])) + 2
+    """The sheet in at most 100 columns, the reasons and the comparison under it."""
     lines = [
-        f"{result['feeder']}: settings, seed {result['seed']}, attempt {result['attempt']}; "
-        f"false-trip bounds of all terminals together at {result['confidence']:.0%} confidence",
+        *wrapped(
+            f"{result['feeder']}: settings, seed {result['seed']}, attempt {result['attempt']}; "
+            "false-trip bounds of all terminals together at "
+            f"{result['confidence']:.0%} confidence"
+        ),
         "",
-        f"{'terminal':<{wide}}{'status':<14}{'I_set A':>8}{'V_set %':>8}{'Z_set Ω':>8}{'margin':>8}"
-        f"{'found':>16}{'false trips':>16}{'bound':>9}",
+        *table_lines(
+            ("terminal", "status"),
+            ("I_set A", "V_set %", "Z_set Ω", "margin", "found", "false trips", "bound"),
+            [_setting_row(row) for row in result["sections"]],
+        ),
+        "",
     ]
-    lines += [_setting_row(row, wide) for row in result["sections"]]
     blind = ", ".join(
-        f"{_name(row)} {row['unreachable']} of {row['opens']}"
+        f"{terminal_name(row)} {row['unreachable']} of {row['opens']}"
         for row in result["sections"]
         if row["unreachable"]
     )
-    lines += [
-        "",
-        *_wrapped(
-            "found: internal breaks with something connected beyond them. Breaks with nothing "
-            f"beyond them cannot be seen: {blind or 'none'}."
-        ),
-        *_wrapped(
-            "bound: upper bound of the probability of a false trip in one event, worst class. "
-            "It covers load steps, source steps and breaks elsewhere; report.html says what it "
-            "does not cover."
-        ),
-        "",
-        f"{'compared':<{wide}}{'':<23}{'I_set A':>8}{'V_set %':>8}{'Z_set Ω':>8}"
-        f"{'found (interval)':>18}{'false trips':>16}",
+    lines += wrapped(
+        "found: internal breaks with something connected beyond them. Breaks with nothing "
+        f"beyond them cannot be seen: {blind or 'none'}."
+    )
+    lines += wrapped(
+        "bound: upper bound of the probability of a false trip in one event, worst class. "
+        "It covers load steps, source steps and breaks elsewhere; report.html says what it "
+        "does not cover."
+    )
+    reasons = [
+        line
+        for row in result["sections"]
+        if (reason := _reservation(row))
+        for line in wrapped(f"{GAP}{terminal_name(row)}: {reason}")
     ]
-    lines += [_compared_row(row, wide) for row in result["compared"]]
+    if reasons:
+        lines += ["", "reasons", *reasons]
+    if result["compared"]:
+        lines += [
+            "",
+            *table_lines(
+                ("compared", "setting"),
+                ("I_set A", "V_set %", "Z_set Ω", "found (interval)", "false trips"),
+                [_compared_row(row) for row in result["compared"]],
+            ),
+        ]
     return "\n".join(lines)
 
 
-def _setting_row(row: dict[str, Any], wide: int) -> str:
-    head = f"{_name(row):<{wide}}{row['status']:<14}"
+Row = tuple[Sequence[str], Sequence[str] | str]
+
+
+def table_lines(key_heads: Sequence[str], heads: Sequence[str], rows: Sequence[Row]) -> list[str]:
+    """A table of at most 100 columns: keys to the left, numbers to the right, under their heads.
+
+    Parameters
+    ----------
+    key_heads
+        Over the keys, which are aligned to the left. Where a row would be too long, its keys
+        stand on a line of their own above its numbers.
+    heads
+        Over the numbers.
+    rows
+        Keys and numbers of each row; a text instead of the numbers runs on below itself.
+    """
+    numbers = [cells for _, cells in rows if not isinstance(cells, str)]
+    key_wide = [max(map(len, own)) for own in zip(key_heads, *(k for k, _ in rows), strict=True)]
+    wide = [max(map(len, own)) for own in zip(heads, *numbers, strict=True)]
+    left = sum(key_wide) + len(GAP) * len(key_wide)
+    beside = left + sum(wide) + len(GAP) * (len(wide) - 1) <= PAGE
+    indent = " " * left if beside else GAP
+    lines = []
+    for keys, cells in ((key_heads, heads), *rows):
+        begin = GAP.join(f"{key:<{w}}" for key, w in zip(keys, key_wide, strict=True)).rstrip()
+        if isinstance(cells, str):
+            below = textwrap.wrap(cells, PAGE - len(indent)) or [""]
+        else:
+            below = [GAP.join(f"{cell:>{w}}" for cell, w in zip(cells, wide, strict=True))]
+        if beside:
+            lines.append((f"{begin:<{left}}" + below.pop(0)).rstrip())
+        else:
+            lines += wrapped(GAP.join(keys)) if len(begin) > PAGE else [begin]
+        lines += [indent + line for line in below]
+    return lines
+
+
+def wrapped(text: str) -> list[str]:
+    """A paragraph in lines of at most 100 columns, all but the first indented."""
+    begin = text[: len(text) - len(text.lstrip())]
+    return textwrap.wrap(text.lstrip(), PAGE, initial_indent=begin, subsequent_indent=begin + GAP)
+
+
+def _setting_row(row: dict[str, Any]) -> Row:
+    keys = (terminal_name(row), row["status"])
     if row["i_set_a"] is None:
-        return head + str(row["reason"])[: 100 - len(head)]
-    return (
-        f"{head}{row['i_set_a']:>8.1f}{row['v_set_pu'] * 100:>8.1f}"
-        f"{row['z_set_ohm']:>8.1f}{_margin(row['margin']):>8}"
-        f"{_share(row['detected'], row['opens'] - row['unreachable']):>16}"
-        f"{_of(row['false_trips'], row['security_trials']):>16}"
-        f"{row['false_trip_upper']:>9.1e}"
+        return keys, row["reason"]
+    return keys, (
+        *_settings(row),
+        "∞" if row["margin"] is None else f"{row['margin']:.2f}",
+        _share(row["detected"], row["opens"] - row["unreachable"]),
+        _of(row["false_trips"], row["security_trials"]),
+        f"{row['false_trip_upper']:.1e}",
     )
 
 
-def _compared_row(row: dict[str, Any], wide: int) -> str:
-    head = f"{_name(row):<{wide}}{row['name']:<23}"
+def _compared_row(row: dict[str, Any]) -> Row:
+    keys = (terminal_name(row), row["name"])
     if row["i_set_a"] is None:
-        return f"{head}no setting keeps the margin"
-    interval = f"{row['dependability_low']:.3f}..{row['dependability_high']:.3f}"
-    return (
-        f"{head}{row['i_set_a']:>8.1f}{row['v_set_pu'] * 100:>8.1f}"
-        f"{row['z_set_ohm']:>8.1f}{interval:>18}{_of(row['false_trips'], row['trials']):>16}"
+        return keys, row["reason"]
+    # outwards, as in the report
+    low = math.floor(row["dependability_low"] * 1000.0) / 1000.0
+    high = math.ceil(row["dependability_high"] * 1000.0) / 1000.0
+    return keys, (
+        *_settings(row),
+        f"{low:.3f}..{high:.3f}",
+        _of(row["false_trips"], row["trials"]),
     )
 
 
-def _name(row: dict[str, Any]) -> str:
-    return f"{row['local']}→{row['remote']}"
+def _settings(row: dict[str, Any]) -> tuple[str, str, str]:
+    values = (row["i_set_a"], row["v_set_pu"] * 100.0, row["z_set_ohm"])
+    i_set, v_set, z_set = map(setting_text, values)
+    return i_set, v_set, z_set
 
 
-def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, 98, subsequent_indent="  ")
-
-
-def _margin(value: float | None) -> str:
-    return "∞" if value is None else f"{value:.2f}"
+def _reservation(row: dict[str, Any]) -> str:
+    """What the table leaves unsaid of a row: why it falls short, or what weakens it."""
+    reason = str(row["reason"])
+    if row["status"] == "set":
+        # the first clause repeats the numbers of the table
+        return reason.partition("; ")[2]
+    return reason if row["i_set_a"] is not None else ""
 
 
 def _share(k: int, n: int) -> str:

@@ -16,6 +16,7 @@ from ..run.certify import COMPARED, Validation
 from ..run.classes import REPORTED
 from ..run.draw import Case
 from ..run.tally import PLACES
+from .sheet import terminal_name
 
 __all__ = [
     "Bar",
@@ -93,9 +94,10 @@ class ProfileView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bar:
-    """One setting of one terminal; share None where no setting was found."""
+    """One setting of one terminal; share None where there is none to show, or no setting."""
 
     share: float | None
+    reason: str | None  #: why there is no setting
     low: float
     high: float
     false_trips: int
@@ -247,9 +249,10 @@ def overview_view(result: dict[str, Any]) -> OverviewView:
     """What the overview picture shows."""
     bars: defaultdict[str, dict[str, Bar]] = defaultdict(dict)
     for row in result["compared"]:
-        found = row["detected"] is not None
-        bars[f"{row['local']}→{row['remote']}"][row["name"]] = Bar(
-            share=row["detected"] / row["opens"] if found and row["opens"] else None,
+        found, reachable = row["detected"] is not None, row["opens"] - row["unreachable"]
+        bars[terminal_name(row)][row["name"]] = Bar(
+            share=row["detected"] / reachable if found and reachable else None,
+            reason=row["reason"],
             low=row["dependability_low"] if found else 0.0,
             high=row["dependability_high"] if found else 0.0,
             false_trips=row["false_trips"] if found else 0,

@@ -16,6 +16,7 @@ from openphase.optimise.staircase import Front, merge_fronts
 from openphase.optimise.thresholds import Choice
 from openphase.studies.run.certify import (
     COMPARED,
+    WORDS,
     Validation,
     compared_rows,
     judged,
@@ -170,7 +171,7 @@ def test_a_false_trip_is_named_with_its_count_class_and_worst_scenario(case: Cas
     )
     row = row_of(case, with_trips(validation(), {STEP_OUTSIDE: 2}, worst), attempt=2)
     assert row["status"] == "not_certified"
-    assert f"2 false trips of {N} in load_step outside" in row["reason"]
+    assert f"2 false trips of {N} in load steps outside;" in row["reason"]
     assert "validate-2-load_step-00012:5" in row["reason"]
     assert "spent" in row["reason"]
     assert row["false_trips"] == 2
@@ -185,7 +186,7 @@ def test_the_worst_class_is_that_of_the_highest_rate(case: Case) -> None:
     worst = front((1.5, 0.001, 80.0, DrawClass.LOAD_STEP, 0, 0))
     own = with_trips(replace(own, trials=trials), {SOURCE: 9, STEP_INSIDE: 1}, worst)
     row = row_of(case, own)
-    assert f"1 false trips of {N // 10} in load_step inside" in row["reason"]
+    assert f"1 false trip of {N // 10} in load steps inside;" in row["reason"]
     assert row["false_trips"] == 10
     assert row["false_trip_upper"] == upper_bound(1, N // 10, ALPHA)
 
@@ -197,7 +198,7 @@ def test_the_worst_scenario_is_of_the_class_that_is_named(case: Case) -> None:
     )
     own = with_trips(validation(), {SOURCE: 1, STEP_OUTSIDE: 5}, worst)
     reason = row_of(case, own)["reason"]
-    assert "in load_step outside" in reason
+    assert "in load steps outside;" in reason
     assert "validate-1-load_step-00003:17" in reason
 
 
@@ -246,8 +247,36 @@ def test_classes_that_never_come_near_are_weak_evidence(case: Case) -> None:
     effective[STEP_OUTSIDE, HEAD] = N // 10  # not under 10 %
     row = row_of(case, replace(own, effective=effective))
     assert row["status"] == "set"
-    assert "few of source_step outside come near" in row["reason"]
-    assert "load_step" not in row["reason"]
+    assert "; few of the source steps come near" in row["reason"]
+    assert "load" not in row["reason"]
+
+
+@pytest.mark.parametrize(
+    ("hollow", "words"),
+    [
+        ((STEP_INSIDE, OPEN_OUTSIDE), "load steps inside and breaks elsewhere"),
+        (
+            (STEP_OUTSIDE, SOURCE, OPEN_OUTSIDE),
+            "load steps outside, source steps and breaks elsewhere",
+        ),
+    ],
+)
+def test_a_reason_names_classes_in_words(case: Case, hollow: tuple[int, ...], words: str) -> None:
+    own = validation()
+    effective = own.effective.copy()
+    effective[list(hollow), HEAD] = 0
+    reason = row_of(case, replace(own, effective=effective))["reason"]
+    assert f"few of the {words} come near" in reason
+
+
+def test_every_class_that_must_not_trip_has_words() -> None:
+    must_not = {(own.name, own.side) for own in REPORTED if own.kind == "must_not_trip"}
+    assert set(WORDS) == must_not
+
+
+def test_i_set_in_pu_has_no_float_dust(case: Case) -> None:
+    assert 1.1 / 100.0 != 0.011
+    assert row_of(case, validation(), replace(CHOICE, i_set_a=1.1))["i_set_pu"] == 0.011
 
 
 def test_classes_list_their_trials_kinds_and_sides(case: Case) -> None:
@@ -298,13 +327,32 @@ def test_compared_rows_are_of_the_same_sample(case: Case) -> None:
         case, HEAD, (chosen, None, paper), replace(own, trips=trips, found=found), 1
     )
     assert [row["name"] for row in rows] == list(COMPARED)
-    keys = "local remote name i_set_a v_set_pu z_set_ohm detected opens dependability_low"
-    keys += " dependability_high false_trips trials upper"
+    keys = "local remote name i_set_a v_set_pu z_set_ohm detected opens unreachable"
+    keys += " dependability_low dependability_high false_trips trials upper reason"
     assert all(list(row) == keys.split() for row in rows)
-    assert [row["opens"] for row in rows] == [1000] * 3
+    # all internal breaks, as in the row of the terminal
+    assert [(row["opens"], row["unreachable"]) for row in rows] == [(1200, 200)] * 3
+    assert rows[0]["dependability_low"] == two_sided(900, 1000, ALPHA)[0]
     assert [row["trials"] for row in rows] == [4 * N] * 3
     assert [row["detected"] for row in rows] == [900, None, 950]
     assert [row["false_trips"] for row in rows] == [0, None, 7]
     assert rows[0]["upper"] == upper_bound(0, N, ALPHA)
     assert rows[1]["upper"] is None
     assert rows[2]["upper"] == upper_bound(7, N, ALPHA)
+
+
+@pytest.mark.parametrize(
+    ("v_set_pct", "why"),
+    [
+        ((0.5, 1.0, 5.0), "no setting with V_set 5 % keeps the margin 1.25"),
+        ((0.5, 1.0), "the device has no V_set of 5 %"),
+    ],
+)
+def test_a_missing_setting_to_compare_says_why(
+    case: Case, v_set_pct: tuple[float, ...], why: str
+) -> None:
+    device = replace(case.study.device, v_set_pct=v_set_pct)
+    own = replace(case, study=replace(case.study, device=device))
+    paper = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0)
+    rows = compared_rows(own, HEAD, (None, None, paper), validation(), 1)
+    assert [row["reason"] for row in rows] == ["no setting keeps the margin 1.25", why, None]

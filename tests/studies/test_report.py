@@ -159,6 +159,32 @@ def test_every_count_stands_in_the_page_as_k_of_n(sizing, page):
             assert f"{own['trips']:,} of {own['trials']:,}" in page
     for row in sizing.result["compared"]:
         assert f"{row['false_trips']:,} of {row['trials']:,}" in page
+        assert f"{row['detected']:,} of {row['opens'] - row['unreachable']:,}" in page
+
+
+def test_settings_are_printed_as_the_device_holds_them(sizing):
+    result = copy.deepcopy(sizing.result)
+    fine = {"i_set_a": 0.15, "i_set_pu": 0.0015, "v_set_pu": 0.0025, "z_set_ohm": 100.25}
+    rows = [result["sections"][t] for t in judged(sizing)] + result["compared"]
+    for row in rows:
+        row |= fine
+    names = ["feeder.png", "overview.png"]
+    for t in judged(sizing):
+        stem = f"{t + 1:02d}-{result['sections'][t]['local']}-{result['sections'][t]['remote']}"
+        names += [f"{stem}-evidence.png", f"{stem}-along-line.png"]
+    page = report_html(result, sizing.case.study, dict.fromkeys(names, b""))
+    cells = '<td class="n">0.15</td><td class="n">0.25</td><td class="n">100.25</td>'
+    assert page.count(cells) == len(rows)
+    assert "I_set 0.15 A (0.0015 pu), V_set 0.25 %, Z_set 100.25 Ω" in page
+
+
+def test_the_overview_shows_shares_of_the_reachable_breaks(sizing):
+    view = views.overview_view(sizing.result)
+    rows = {f"{r['local']}→{r['remote']}": r for r in sizing.result["sections"] if r["classes"]}
+    assert set(view.terminals) == set(rows)
+    assert any(row["unreachable"] for row in rows.values())
+    for name, bars in zip(view.terminals, view.bars, strict=True):
+        assert bars[0].share == rows[name]["dependability"]
 
 
 @pytest.mark.parametrize("status", STATUS)
@@ -183,8 +209,10 @@ def test_a_terminal_without_a_setting_is_still_drawn(sizing, tmp_path):
     row["classes"] = [own | {"trips": None, "upper": None} for own in row["classes"]]
     empty = ("detected", "dependability_low", "dependability_high", "false_trips", "upper")
     result["compared"][0] |= dict.fromkeys([*empty, "i_set_a", "v_set_pu", "z_set_ohm"])
+    result["compared"][0]["reason"] = "the device has no V_set of <5 %"
     page = write(sizing, tmp_path / "run", result)["report.html"].decode()
     assert "No setting. Line between" in page
+    assert '<td colspan="7">the device has no V_set of &lt;5 %</td>' in page
     assert "None" not in page
 
 

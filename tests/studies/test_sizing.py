@@ -17,7 +17,7 @@ from openphase.model import load_feeder
 from openphase.model.errors import OpenPhaseError
 from openphase.model.feeder_file import dump_feeder
 from openphase.studies import cli, sizing
-from openphase.studies.run.ledger import enter, find_attempt
+from openphase.studies.run.ledger import find_attempt, reserve
 from openphase.studies.run.spec import default_study, dump_study
 
 NOT_COMPARED = {"log.txt", "timing.json"}
@@ -28,8 +28,8 @@ SECTION_KEYS = """local remote setting_group status reason i_set_a i_set_pu v_se
     dt_ms delay_ms trigger line_z1_ohm margin opens unreachable detected dependability
     dependability_low dependability_high security_trials false_trips false_trip_upper
     false_trips_per_year_upper classes causes nearest_false_trip fixes"""
-COMPARED_KEYS = """local remote name i_set_a v_set_pu z_set_ohm detected opens dependability_low
-    dependability_high false_trips trials upper"""
+COMPARED_KEYS = """local remote name i_set_a v_set_pu z_set_ohm detected opens unreachable
+    dependability_low dependability_high false_trips trials upper reason"""
 CLASS_KEYS = "name kind side trials effective_trials trips upper"
 
 
@@ -310,9 +310,9 @@ def test_the_ledger_counts_by_population_study_seed_and_size(tmp_path: Path) -> 
     numbers = []
     for own in tries:
         attempt = find_attempt(path, *own)
-        numbers.append(attempt.number)
         assert find_attempt(path, *own) == attempt  # looking writes nothing
-        enter(path, attempt)
+        assert reserve(path, *own) == attempt
+        numbers.append(attempt.number)
     assert numbers == [1, 2, 1, 3, 4, 2]
 
 
@@ -323,9 +323,8 @@ def test_a_size_left_open_grows_with_the_attempt(tmp_path: Path) -> None:
         return 100 * attempt
 
     for seed, number in ((1, 1), (2, 2), (1, 1), (2, 2)):
-        attempt = find_attempt(path, "a", "s", seed, needed)
+        attempt = reserve(path, "a", "s", seed, needed)
         assert (attempt.number, attempt.scenarios) == (number, 100 * number)
-        enter(path, attempt)
     assert find_attempt(path, "a", "s", 2, 200).number == 2
 
 
@@ -472,4 +471,24 @@ def test_an_unwritable_place_is_told_as_such(tmp_path: Path) -> None:
     assert "file" in said.err
     path = tmp_path / "file" / "ledger.json"
     with pytest.raises(OpenPhaseError):
-        enter(path, find_attempt(path, "a", "s", 1, 1))
+        reserve(path, "a", "s", 1, 1)
+
+
+def test_runs_at_the_same_time_get_numbers_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "ledger.json"
+    with ThreadPoolExecutor(8) as pool:
+        taken = pool.map(lambda seed: reserve(path, "a", "s", seed, 400).number, range(24))
+        assert sorted(taken) == list(range(1, 25))
+
+
+def test_one_population_however_it_is_written() -> None:
+    feeder, study = load_feeder("paper"), default_study("paper")
+    own = population_digest(feeder, study)
+    unnamed = replace(study, network=NetworkState(closed=None))
+    assert population_digest(replace(feeder, name="other"), unnamed) == own
+    margin = replace(study, certificate=replace(study.certificate, margin=2.0))
+    assert population_digest(feeder, margin) == own
+    loads = replace(study, loads=replace(study.loads, level=(0.5, 1.0)))
+    assert population_digest(feeder, loads) != own
+    tied = replace(study, network=NetworkState(closed=("R4",)))
+    assert population_digest(feeder, tied) != own

@@ -130,7 +130,8 @@ def test_a_sheet_decides_who_trips(tmp_path: Path, capsys: pytest.CaptureFixture
         (
             "R2-R9:1.5:ax",
             [
-                "--open: line must be a line of 'paper' (did you mean 'R2-R3'?), got R2-R9",
+                "--open: line must be a line of 'paper': R1-R2, R2-R3, R3-R4, R4-R5 "
+                "(did you mean 'R2-R3'?), got R2-R9",
                 "--open: fraction must be a number in 0..1, got 1.5",
                 "--open: phases must be one, two or three of a, b, c, got ax",
             ],
@@ -163,8 +164,8 @@ def test_all_faults_of_a_sheet_are_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_settings(sheet, load_feeder("paper"))
     said = str(caught.value).splitlines()
-    assert [line.split(":")[1] for line in said[:4]] == ["3", "4", "5", "5"]
-    assert said[-1] == "4 faults"
+    assert [line.split(":")[1] for line in said[:-1]] == ["3", "4", "4", "4", "5", "5"]
+    assert said[-1] == "6 faults"
 
 
 def test_missing_columns_and_files(tmp_path: Path) -> None:
@@ -174,3 +175,25 @@ def test_missing_columns_and_files(tmp_path: Path) -> None:
         read_settings(sheet, load_feeder("paper"))
     with pytest.raises(InputError, match="must be a CSV file to read"):
         read_settings(tmp_path / "none.csv", load_feeder("paper"))
+
+
+def test_a_sheet_in_percent_is_refused(tmp_path: Path) -> None:
+    sheet = tmp_path / "percent.csv"
+    sheet.write_text("local,remote,i_set_a,v_set_pu,z_set_ohm\nR1,R2,1,5,5\n")
+    with pytest.raises(InputError, match="per unit and not percent"):
+        read_settings(sheet, load_feeder("paper"))
+    sheet.write_text("local;remote;i_set_a;v_set_pu;z_set_ohm\nR1;R2;1;0,05;5\n")
+    with pytest.raises(InputError, match="must be separated by commas"):
+        read_settings(sheet, load_feeder("paper"))
+
+
+def test_faults_of_break_switch_and_sheet_come_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sheet = str(tmp_path / "none.csv")
+    words = ["solve", "paper", "--open", "R9:7:zz", "--close", "QQ", "--settings", sheet]
+    assert main(words) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert [line.split(":")[0] for line in said[:3]] == ["--open"] * 3
+    assert said[3].startswith("--close: name must be a switch of 'paper': R4, got QQ")
+    assert said[4].startswith(sheet)

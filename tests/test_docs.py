@@ -1,0 +1,104 @@
+"""What the documents promise: examples that run together, links that lead somewhere, targets."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from openphase.model import read_feeder
+from openphase.studies.cli import main
+from openphase.studies.run.spec import check_study, read_study
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+PAGES = [*FRONT, *sorted(DOCS.glob("*.md")), *sorted((DOCS / "decisions").glob("*.md"))]
+
+
+def prose(text: str) -> str:
+    """Return a page without its fenced blocks."""
+    return re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def broken_links(page: Path) -> list[str]:
+    """Return the relative links of a page that lead to nothing."""
+    links = re.findall(r"\]\(([^)\s]+)\)", prose(page.read_text(encoding="utf-8")))
+    files = [link.partition("#")[0] for link in links if not re.match(r"[a-z]+:", link)]
+    return [file for file in files if file and not (page.parent / file).exists()]
+
+
+def named_targets(text: str) -> set[str]:
+    """Return the targets in the page's ``make TARGET`` commands, in backquotes or indented."""
+    inline = re.findall(r"`([^`\n]+)`", text)
+    indented = re.findall(r"^ {4}(\S.*)$", text, flags=re.MULTILINE)
+    commands = [command for line in inline + indented for command in line.split("&&")]
+    found = [re.match(r"\s*make ([\w./-]+)", command) for command in commands]
+    return {match[1] for match in found if match}
+
+
+def made_targets() -> set[str]:
+    """Return what the Makefile can make, written out."""
+    text = (ROOT / "Makefile").read_text(encoding="utf-8").replace("$(VENV)", ".venv")
+    return set(re.findall(r"^([\w./-]+):(?!=)", text, flags=re.MULTILINE))
+
+
+def test_the_examples_of_feeder_and_study_go_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = {"example.toml": "feeder-file.md", "study.toml": "study-file.md"}
+    for name, page in files.items():
+        text = (DOCS / page).read_text(encoding="utf-8")
+        assert f"`{name}`" in text
+        example = text.partition("```toml\n")[2].partition("```")[0]
+        (tmp_path / name).write_text(example, encoding="utf-8")
+    feeder, study = read_feeder(tmp_path / "example.toml"), read_study(tmp_path / "study.toml")
+    check_study(study, feeder, "study.toml")
+    assert study.transformers.yg_d
+    assert study.network.closed
+    assert main(["check", str(tmp_path / "example.toml")]) == 0
+    printed = capsys.readouterr().out
+    for section in feeder.sections:
+        assert section.local in printed
+        assert section.remote in printed
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_relative_links_lead_to_files(page: Path) -> None:
+    assert broken_links(page) == []
+
+
+def test_a_link_to_nothing_is_seen(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(
+        "[a](page.md#top) [b](#top) [c](https://host/x) [d](gone.md)\n```toml\n[x](y)\n```\n",
+        encoding="utf-8",
+    )
+    assert broken_links(page) == ["gone.md"]
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_the_readme_links_every_document(page: Path) -> None:
+    assert f"(docs/{page.name})" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
+def test_the_makefile_has_every_target_that_is_named(page: str) -> None:
+    named = named_targets((ROOT / page).read_text(encoding="utf-8"))
+    assert "demo" in named
+    assert named - made_targets() == set()
+
+
+def test_targets_are_seen_where_they_are_named() -> None:
+    text = "    make a   # so\n\n`make b && x`, `make .venv/c` and `x && make d`; make sure\n"
+    assert named_targets(text) == {"a", "b", ".venv/c", "d"}
+    assert {"demo", ".venv/installed"} <= made_targets()
+    assert "VENV" not in made_targets()
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
+def test_files_named_in_backquotes_exist(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    named = re.findall(r"`((?:docs|tests|model|detector|optimise|studies)/[\w./-]+)`", text)
+    assert [name for name in named if "NNNN" not in name and not (ROOT / name).exists()] == []
