@@ -9,7 +9,7 @@ __all__ = ["connection_impedance"]
 
 Complex = NDArray[np.complex128]
 
-ROUNDING = 1e-11  #: a difference below this share of its terms is rounding, not physics
+ROUNDING = 1e-10  #: a difference below this share of its terms is rounding, not physics
 
 
 def connection_impedance(
@@ -35,7 +35,8 @@ def connection_impedance(
     numerator = dv_local * v_remote - dv_remote * v_local
     explained = dv_local * i_local
     denominator = di_local * v_local - explained
-    undefined = np.asarray(np.abs(denominator) <= ROUNDING * np.abs(explained))
+    rounding = ROUNDING * np.maximum(np.abs(explained), np.abs(v_local * i_local))
+    undefined = np.asarray(np.abs(denominator) <= rounding)
     if undefined.any():
         denominator[undefined] = 1.0
         numerator[undefined] = 0.0

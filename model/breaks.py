@@ -57,6 +57,9 @@ def open_phases(mask: int, here: Complex) -> int:
         if squared(w[a, a]) <= limit:
             flags |= UNDEFINED << a
             flags |= DEAD if empty & (1 << a) else FLOATING
+            for i in range(3):  # an opened phase that hangs on this one is as little defined
+                if i != a and mask & (1 << i) and squared(p[i, a]) > SINGULAR**2:
+                    flags |= UNDEFINED << i
             for j in range(3):
                 row[0, j] = row[1, j] = 0.0
         else:

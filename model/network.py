@@ -144,11 +144,6 @@ def compile_network(feeder: Feeder, closed: frozenset[str] | None = None) -> Net
         load_y_s=load_y,
         v_nominal_v=source.v_phase_v,
     )
-    transformers = {t.name: t for t in feeder.transformers}
-    connection = [
-        CONNECTIONS[transformers[u].connection] if u in transformers else _direct(feeder, u)
-        for u in units
-    ]
     kept = count + 1 if chord is not None else count
     return Network(
         tree=tree,
@@ -158,7 +153,7 @@ def compile_network(feeder: Feeder, closed: frozenset[str] | None = None) -> Net
         length_km=np.array([p.length_km if p else 0.0 for p in edge_pieces[:kept]]),
         units=units,
         loads=tuple(load.name for load in feeder.loads),
-        connection=np.array(connection, np.int64),
+        connection=_connections(feeder),
         exponent=np.array([load.exponent for load in feeder.loads], np.float64),
         equipped=_equipped(tree)[:kept],
         emf_pu=source.emf_pu,
@@ -339,9 +334,15 @@ def _loads(
     return np.array(unit, np.int64), np.array(y, np.complex128)
 
 
-def _direct(feeder: Feeder, name: str) -> int:
-    load = next(item for item in feeder.loads if item.name == name)
-    return YG_YG if load.connection == "wye" else D_YG
+def _connections(feeder: Feeder) -> NDArray[np.int64]:
+    """Winding connections of the units; a direct load is a bank without leakage."""
+    own = [CONNECTIONS[unit.connection] for unit in feeder.transformers]
+    own += [
+        YG_YG if load.connection == "wye" else D_YG
+        for load in feeder.loads
+        if load.transformer is None
+    ]
+    return np.array(own, np.int64)
 
 
 def _equipped(tree: Tree) -> NDArray[np.bool_]:

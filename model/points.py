@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .network import Network, compile_network
+from .errors import InputError
+from .network import Network, Piece, compile_network
 from .parts import Feeder, Point, Section
 from .states import Probes
 from .topology import edges, forest, tree_path
@@ -60,7 +61,11 @@ def into_line(points: Points) -> NDArray[np.float64]:
 
 
 def find_points(feeder: Feeder, network: Network) -> Points:
-    """Place the feeder's points and sections in ``network``."""
+    """Place the feeder's points and sections in ``network``.
+
+    Raises InputError for a section that the source feeds from between its points: neither
+    terminal would measure what enters it.
+    """
     ends = [_end(network, p) for p in feeder.points]
     terminals = []
     for section in feeder.sections:
@@ -118,26 +123,42 @@ def _laterals(
     feeder: Feeder, network: Network, lines: set[str], ends: list[Point]
 ) -> NDArray[np.bool_]:
     """Edges that tee off the path between the two points, up to the next point."""
-    normal = [p for p in compile_network(feeder).pieces if p is not None]
-    edge_of = {p.key: k for k, p in enumerate(network.pieces) if p is not None}
-    guarded = {(p.bus, p.line) for p in feeder.points}
+    pieces = [p for p in compile_network(feeder).pieces if p is not None]
     # the bus of an end lies inside unless its point stands on the section's own side of it
-    outer = {p.bus for p in ends if p.line in lines} | {feeder.source.bus}
-    waiting = sorted({n for p in normal if p.line in lines for n in p.ends} - outer)
-    seen = set(waiting) | outer
-    found = np.zeros(len(network.pieces), np.bool_)
+    outer = {p.bus for p in ends if p.line in lines}
+    inner = {name for p in pieces if p.line in lines for name in p.ends} - outer
+    off_path = [p for p in pieces if p.line not in lines]
+    _, reached = _grow(off_path, inner, outer, ends)
+    if feeder.source.bus in reached:
+        raise InputError.single(
+            feeder.name,
+            f"sections '{ends[0].name}'–'{ends[1].name}'",
+            "a way to the source that passes neither of them",
+            "must be fed through its two points alone",
+        )
+    found, _ = _grow(off_path, inner, outer, list(feeder.points))
+    return np.array([p is not None and p.key in found for p in network.pieces], np.bool_)
+
+
+def _grow(
+    pieces: list[Piece], inner: set[str], outer: set[str], points: list[Point]
+) -> tuple[set[object], set[str]]:
+    """Pieces and nodes that are joined to ``inner`` without passing any of ``points``."""
+    guarded = {(p.bus, p.line) for p in points}
+    found: set[object] = set()
+    reached = set(inner)
+    waiting = sorted(inner)
     while waiting:
         name = waiting.pop()
-        for piece in normal:
-            if name not in piece.ends or piece.line in lines or (name, piece.line) in guarded:
+        for piece in pieces:
+            if name not in piece.ends or (name, piece.line) in guarded:
                 continue
-            if piece.key in edge_of:
-                found[edge_of[piece.key]] = True
+            found.add(piece.key)
             far = piece.ends[0] if piece.ends[1] == name else piece.ends[1]
-            if far not in seen and (far, piece.line) not in guarded:
-                seen.add(far)
+            if far not in reached and far not in outer and (far, piece.line) not in guarded:
+                reached.add(far)
                 waiting.append(far)
-    return found
+    return found, reached
 
 
 def _reaches_source(network: Network, node: int, cut: NDArray[np.bool_]) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model.errors import OpenPhaseError
+from ..model.errors import InputError, OpenPhaseError
 from ..model.feeder_file import load_feeder
 from ..model.network import Network, compile_network
 from ..model.parts import Feeder
@@ -127,11 +127,14 @@ def _assumed(feeder: Feeder) -> list[str]:
 def _plot(feeder: Feeder, path: Path) -> None:
     from .show.plots import plot_feeder, save_figure  # noqa: PLC0415  (only a picture needs it)
 
+    if path.suffix.lower() not in (".png", ".svg"):
+        raise InputError.single("--plot", "", path.name, "must end in .png or .svg")
     figure = plot_feeder(feeder).get_figure()
     try:
         save_figure(figure, path)
-    except (OSError, ValueError) as error:
-        raise OpenPhaseError(f"{path}: the picture cannot be written: {error}") from error
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OpenPhaseError(f"{path}: the picture cannot be written: {reason}") from error
 
 
 def _text(found: dict[str, Any]) -> str:

@@ -19,7 +19,8 @@ NUMBERS = ("i_set_a", "v_set_pu", "z_set_ohm")
 def read_settings(path: Path, feeder: Feeder) -> dict[tuple[str, str], Settings | None]:
     """Read settings by (local, remote); None where the sheet leaves a terminal without.
 
-    Columns beyond local, remote, i_set_a, v_set_pu and z_set_ohm are not needed here.
+    Columns beyond local, remote, i_set_a, v_set_pu, z_set_ohm and negative_sign (True where
+    there is none) are not needed here.
 
     Raises
     ------
@@ -73,6 +74,7 @@ def _settings(row: dict[str, str]) -> tuple[Settings | None, list[tuple[str, str
     if not any(texts.values()):
         return None, []
     numbers = {name: _number(text) for name, text in texts.items()}
+    sign = (row.get("negative_sign") or "True").strip().lower()
     wrong = [
         (name, "must be a number > 0", repr(texts[name]))
         for name, number in numbers.items()
@@ -80,7 +82,11 @@ def _settings(row: dict[str, str]) -> tuple[Settings | None, list[tuple[str, str
     ]
     if 1.0 < numbers["v_set_pu"] < math.inf:
         wrong.append(("v_set_pu", "must be <= 1, per unit and not percent", texts["v_set_pu"]))
-    return (None if wrong else Settings(**numbers)), wrong
+    if sign not in ("true", "false"):
+        wrong.append(("negative_sign", "must be True or False", repr(row["negative_sign"])))
+    if wrong:
+        return None, wrong
+    return Settings(**numbers, negative_sign=sign == "true"), []
 
 
 def _number(text: str) -> float:

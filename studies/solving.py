@@ -273,6 +273,7 @@ def _sections(
                 "zabc_ohm": [
                     None if undefined[a, 0] else _pair(z_abc[a, 0]) for a in range(len(PHASES))
                 ],
+                "di_abc_a": np.abs(phasors.i[1, m] - phasors.i[0, m])[:, 0].tolist(),
                 "trip": reason == Reason.TRIP,
                 "reason": reason.text if reason is not None else "no setting in the sheet",
             }
@@ -281,37 +282,54 @@ def _sections(
 
 
 def _table(feeder: Feeder, broken: Break, answer: dict[str, Any]) -> str:
-    """The answer for people, in 100 columns."""
+    """The answer for people, in 100 columns where names are short."""
     phases = "".join(PHASES[a] for a in broken.phases)
-    v_nominal = feeder.source.v_phase_v
+    scale = 100 / feeder.source.v_phase_v
+    wide = max(9, *(len(name) for name in answer["buses"])) + 2
     lines = [
         f"{feeder.name}: phase {phases} open at {broken.fraction:g} of {broken.line}",
         "",
-        f"{'bus':<12}{'|V| before, % of nominal':^30}{'|V| after, %':^30}{'|change|, %':^24}",
+        f"{'bus':<{wide}}{'|V| before, %':^27}  {'|V| after, %':^27}  {'|change|, %':^27}",
     ]
     for name, bus in answer["buses"].items():
         change = [
             None if b is None or a is None else [a[0] - b[0], a[1] - b[1]]
             for b, a in zip(bus["before"], bus["after"], strict=True)
         ]
-        columns = [_sizes(part, 100 / v_nominal) for part in (bus["before"], bus["after"], change)]
-        lines.append(f"{name:<12}{columns[0]:^30}{columns[1]:^30}{columns[2]:^24}")
-    lines += [
-        "",
-        f"{'terminal':<12}{'|ΔI1| A':>9}{'|ΔI1*| A':>10}{'|ΔV1| %':>9}{'Z1 Ω':>18}   verdict",
-    ]
-    for row in answer["sections"]:
-        lines.append(
-            f"{row['local'] + '→' + row['remote']:<12}"
-            f"{row['di1_a']:>9.4f}{row['di1_star_a']:>10.4f}"
-            f"{row['dv1_pu'] * 100:>9.3f}{_polar(row['z1_ohm']):>18}   {row['reason']}"
-        )
+        parts = (bus["before"], bus["after"], change)
+        lines.append(f"{name:<{wide}}" + "  ".join(_sizes(part, scale) for part in parts))
+    lines.append("in % of nominal, phases a, b, c; –: connected to nothing, or to no earth")
+    if answer["sections"]:
+        lines += ["", *_terminal_rows(answer["sections"])]
     return "\n".join(lines) + "\n"
 
 
+def _terminal_rows(sections: list[dict[str, Any]]) -> list[str]:
+    """What each terminal sees: in positive sequence, then in phases."""
+    names = [f"{row['local']}→{row['remote']}" for row in sections]
+    wide = max(8, *(len(name) for name in names)) + 2
+    lines = [
+        f"{'terminal':<{wide}}{'|ΔI1| A':>9}{'|ΔI1*| A':>10}{'|ΔV1| %':>9}{'Z1 Ω':>19}  verdict"
+    ]
+    lines += [
+        f"{name:<{wide}}{row['di1_a']:>9.4f}{row['di1_star_a']:>10.4f}"
+        f"{row['dv1_pu'] * 100:>9.3f}{_polar(row['z1_ohm']):>19}  {row['reason']}"
+        for name, row in zip(names, sections, strict=True)
+    ]
+    lines += ["", f"{'terminal':<{wide}}{'|ΔI| a, b, c, A':^27}  {'|Z| a, b, c, Ω':^33}"]
+    for name, row in zip(names, sections, strict=True):
+        currents = "".join(f"{value:>9.4f}" for value in row["di_abc_a"])
+        impedances = "".join(
+            f"{'undefined':>11}" if z is None else f"{abs(complex(*z)):>11.3f}"
+            for z in row["zabc_ohm"]
+        )
+        lines.append(f"{name:<{wide}}{currents}  {impedances}")
+    return lines
+
+
 def _sizes(values: list[list[float] | None], scale: float) -> str:
-    texts = ["floats" if v is None else f"{abs(complex(*v)) * scale:.3f}" for v in values]
-    return " ".join(f"{text:>8}" for text in texts)
+    texts = ["–" if v is None else f"{abs(complex(*v)) * scale:.3f}" for v in values]
+    return "".join(f"{text:>9}" for text in texts)
 
 
 def _polar(value: list[float] | None) -> str:

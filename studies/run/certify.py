@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...detector.criteria import Reason, Settings
 from ...model.points import Terminal
 from ...optimise.certificate import share_of_alpha, two_sided, upper_bound
-from ...optimise.staircase import Front, merge_fronts, nearest
+from ...optimise.staircase import Front, factors, merge_fronts, nearest
 from ...optimise.thresholds import Choice
 from .classes import REPORTED, DrawClass, Purpose
 from .draw import BlockId, Case
@@ -78,6 +78,14 @@ class Validation:
     samples: tuple[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]], ...]  #: for pictures
 
 
+#: drawn classes as reasons name them
+DRAWN_WORDS = {
+    DrawClass.OPEN_PHASE: "breaks elsewhere",
+    DrawClass.LOAD_STEP: "load steps",
+    DrawClass.SOURCE_STEP: "source steps",
+    DrawClass.OPEN_THREE: "three-phase breaks",
+}
+
 #: how a reported class is drawn
 CLASS_IDS = {own.name: int(own.drawn) for own in REPORTED}
 
@@ -140,6 +148,7 @@ def section_row(
         "dt_ms": study.detector.dt_ms,
         "delay_ms": study.detector.delay_ms,
         "trigger": "|dI1|",
+        "negative_sign": study.detector.negative_sign,
         "line_z1_ohm": [terminal.line_z1_ohm.real, terminal.line_z1_ohm.imag],
         "margin": choice.margin if choice and math.isfinite(choice.margin) else None,
     }
@@ -174,7 +183,11 @@ def section_row(
         "nearest_false_trip": _nearest(choice, training_front, attempt) if choice else None,
         "fixes": [],
     }
-    row["status"], row["reason"] = _status(case, row, must_not, validation.front[t], attempt)
+    if choice is None:
+        row["status"], row["reason"] = "none", _no_setting(case, training_front)
+    else:
+        front = validation.front[t]
+        row["status"], row["reason"] = _status(case, row, must_not, front, attempt)
     return row
 
 
@@ -207,7 +220,7 @@ def _class_row(
         "kind": own.kind,
         "side": own.side,
         "trials": trials,
-        "effective_trials": int(validation.effective[r, t]),
+        "effective_trials": int(validation.effective[r, t]) if choice else None,
         "trips": trips if choice else None,
         "upper": upper_bound(trips, trials, alpha) if choice else None,
     }
@@ -238,10 +251,9 @@ def _nearest(choice: Choice, front: Front, attempt: int) -> dict[str, Any] | Non
 def _status(
     case: Case, row: dict[str, Any], must_not: list[dict[str, Any]], front: Front, attempt: int
 ) -> tuple[str, str]:
-    """A terminal's status and the reason for it."""
+    """The status and the reason for it, of a terminal that has settings."""
     demand = case.study.certificate
-    if row["i_set_a"] is None:
-        return "none", f"no setting of the device keeps the margin {demand.margin:g} in training"
+    note = _weak_evidence(must_not)
     if row["false_trips"]:
         worst = max(must_not, key=lambda own: own["trips"] / own["trials"])
         of_worst = front.scenario[:, 0] == CLASS_IDS[worst["name"]]
@@ -256,22 +268,42 @@ def _status(
     if row["false_trip_upper"] > demand.target:
         return "not_certified", (
             f"no false trip, but the bound {row['false_trip_upper']:.2g} per event is above the "
-            f"target {demand.target:.2g}: too few scenarios"
+            f"target {demand.target:.2g}: too few scenarios{note}"
         )
-    hollow = [
-        _words(own) for own in must_not if own["effective_trials"] < FEW_EFFECTIVE * own["trials"]
-    ]
-    note = (
-        f"; few of the {' and '.join(filter(None, [', '.join(hollow[:-1]), hollow[-1]]))} "
-        "come near the thresholds: their zero is weak evidence"
-        if hollow
-        else ""
-    )
     sure = math.floor(row["dependability_low"] * 1000) / 1000
     if row["dependability_low"] >= demand.find_at_least:
         return "set", f"no false trip, finds at least {sure:.3f}{note}"
     return "weak", (
         f"no false trip, but finds only {sure:.3f} for sure, {demand.find_at_least:g} wanted{note}"
+    )
+
+
+def _weak_evidence(must_not: list[dict[str, Any]]) -> str:
+    """A note that names the classes whose events hardly ever came near the thresholds."""
+    hollow = [
+        _words(own) for own in must_not if own["effective_trials"] < FEW_EFFECTIVE * own["trials"]
+    ]
+    if not hollow:
+        return ""
+    names = " and ".join(filter(None, [", ".join(hollow[:-1]), hollow[-1]]))
+    return f"; few of the {names} come near the thresholds: their zero is weak evidence"
+
+
+def _no_setting(case: Case, front: Front) -> str:
+    """Why no setting keeps the margin: what the strictest one keeps, and what blocks it."""
+    device, demand = case.study.device, case.study.certificate
+    strictest = (device.i_grid()[-1], device.v_grid_pu()[0], device.z_grid()[-1])
+    each = factors(front, *(np.array([value]) for value in strictest))[:, 0]
+    blocking = front.scenario[each < demand.margin, 0]
+    said = f"no setting of the device keeps the margin {demand.margin:g} in training"
+    if not blocking.size:
+        return said
+    drawn = DrawClass(int(np.bincount(blocking).argmax()))
+    share = float((blocking == drawn).mean())
+    return (
+        f"{said}: the strictest keeps {math.floor(each.min() * 100) / 100:g}; {share:.0%} of what "
+        f"blocks it are {DRAWN_WORDS[drawn]}. A lower margin, or a device with larger I_set and "
+        "Z_set or a smaller V_set, would help"
     )
 
 

@@ -77,7 +77,7 @@ def _locked(path: Path) -> Iterator[None]:
             lock.touch(exist_ok=False)
             break
         except FileExistsError:
-            if not lock.is_file():
+            if not lock.parent.is_dir():
                 raise OpenPhaseError(f"{path.parent}: must be a folder") from None
             time.sleep(LOCK_WAIT_S)
         except OSError as error:

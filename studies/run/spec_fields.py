@@ -274,7 +274,7 @@ TABLES: dict[str, tuple[Field, ...]] = {
             kind="number",
             low=0.5,
             high=1.0,
-            doc="Confidence of all bounds together, less than 1.",
+            doc="Confidence of the terminals' false-trip bounds together, less than 1.",
         ),
         Field(
             name="target",

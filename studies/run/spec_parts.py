@@ -320,7 +320,7 @@ class CertificateDemand:
     Parameters
     ----------
     confidence
-        Probability that every bound of the certificate holds, all together.
+        Probability that the false-trip bounds of all terminals hold together.
     target
         The most false trips per event that the upper bound may leave possible.
     find_at_least

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ...model.parts import Feeder
 from .feeder_layout import FeederLayout, Mark, Tie, lay_out
 from .figures import TALLEST, axes_or_new, house_style, png_of, save_figure, save_png
-from .views import Bar, Cloud, EvidenceView, OverviewView, ProfileView
+from .sheet import setting_text
+from .views import Bar, Cloud, EvidenceView, OverviewView, ProfileView, Setting
 
 __all__ = [
     "plot_evidence",
@@ -156,10 +157,7 @@ def _draw_settings(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
             lw=0.9,
             zorder=5,
         )
-        label = (
-            f"chosen: {own.i_set_a:g} A, {_percent(own.v_set_pu)}, {own.z_set_ohm:g} Ω, "
-            "and what it trips"
-        )
+        label = f"chosen: {_settings(own)}, and what it trips"
         handles += ax.plot(
             own.i_set_a,
             own.z_set_ohm,
@@ -181,7 +179,7 @@ def _draw_settings(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
         markeredgecolor="black",
         markersize=10,
         zorder=6,
-        label=f"reference: {own.i_set_a:g} A, {_percent(own.v_set_pu)}, {own.z_set_ohm:g} Ω",
+        label=f"reference: {_settings(own)}",
     )
     (x0, x1), (y0, y1) = view.device_a, view.device_ohm
     handles += ax.plot(
@@ -262,7 +260,8 @@ def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
 def _draw_bar(ax: Axes, y: float, bar: Bar, n: int, height: float) -> None:
     colour, hatch = OVERVIEW[n]
     if bar.share is None:
-        ax.text(0.01, y, "no setting keeps the margin", va="center", fontsize=8, color="#444444")
+        why = bar.reason or "no break to find"
+        ax.text(0.01, y, why, va="center", fontsize=8, color="#444444")
         return
     ax.barh(y, bar.share, height, color=colour, edgecolor="white", hatch=hatch, lw=0)
     ax.plot([bar.low, bar.high], [y, y], color="black", lw=1.4, solid_capstyle="butt")
@@ -279,8 +278,13 @@ def _draw_bar(ax: Axes, y: float, bar: Bar, n: int, height: float) -> None:
     )
 
 
+def _settings(own: Setting) -> str:
+    i_set, z_set = setting_text(own.i_set_a), setting_text(own.z_set_ohm)
+    return f"{i_set} A, {_percent(own.v_set_pu)}, {z_set} Ω"
+
+
 def _percent(pu: float) -> str:
-    return f"{pu * 100:g} %"
+    return f"{setting_text(pu * 100)} %"
 
 
 # ---- the feeder ----

@@ -165,8 +165,10 @@ def _head(result: dict[str, Any], study: Study) -> str:
     )
     return (
         f"<p>Seed {result['seed']}, attempt {result['attempt']}, at least "
-        f"{result['scenarios']:,} scenarios of every class and side. All bounds hold together at "
-        f"{percent(result['confidence'], 0)} confidence, over all terminals and attempts; the "
+        f"{result['scenarios']:,} scenarios of every class and side. The false-trip bounds of all "
+        f"terminals (for each its worst class) hold together at "
+        f"{percent(result['confidence'], 0)} confidence, over all attempts; so do, apart from "
+        f"them, the dependability intervals of the chosen settings. The "
         f"target is at most {bound_text(demand.target)} false trips per event.</p>\n"
         f"<h3>What the status words mean</h3>\n<dl>\n{words}\n</dl>"
     )

@@ -95,7 +95,7 @@ def sheet_table(result: dict[str, Any]) -> str:
             "",
             *table_lines(
                 ("compared", "setting"),
-                ("I_set A", "V_set %", "Z_set Ω", "found (interval)", "false trips"),
+                ("I_set A", "V_set %", "Z_set Ω", "found (interval)", "false trips", "bound"),
                 [_compared_row(row) for row in result["compared"]],
             ),
         ]
@@ -159,16 +159,19 @@ def _setting_row(row: dict[str, Any]) -> Row:
 
 
 def _compared_row(row: dict[str, Any]) -> Row:
-    keys = (terminal_name(row), row["name"])
+    keys = (terminal_name(row), row["name"].replace("reference V_set", "ref. V_set"))
     if row["i_set_a"] is None:
         return keys, row["reason"]
+    reachable = row["opens"] - row["unreachable"]
+    share = row["detected"] / reachable if reachable else 0.0
     # outwards, as in the report
     low = math.floor(row["dependability_low"] * 1000.0) / 1000.0
     high = math.ceil(row["dependability_high"] * 1000.0) / 1000.0
     return keys, (
         *_settings(row),
-        f"{low:.3f}..{high:.3f}",
+        f"{share:.3f} {low:.3f}..{high:.3f}",
         _of(row["false_trips"], row["trials"]),
+        f"{row['upper']:.1e}",
     )
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from oracles.dense import DenseSolution, Event, solve_dense
 from oracles.random_feeders import random_event, random_feeder
 
+from openphase.model import load_feeder
 from openphase.model.breaks import DEAD, FLOATING
 from openphase.model.network import CONNECTIONS, Network, compile_network, locate
-from openphase.model.parts import Feeder
+from openphase.model.parts import Feeder, Place
 from openphase.model.solve import solve, steady_state
 from openphase.model.states import NOT_CONVERGED, Answer, State
+from openphase.studies.solving import Break, solve_break
 
 TOLERANCE = 1e-9
 
@@ -147,3 +151,49 @@ def test_loops_breaks_and_connections_all_occur_in_the_sample() -> None:
                 seen.add("chord" if on_chord else f"loop {network.tree.in_loop[edge]}")
     assert seen >= {*CONNECTIONS, "wye", "delta", "open 1", "open 2", "open 3", "step"}
     assert seen >= {"chord", "loop True", "loop False"}
+
+
+@pytest.mark.parametrize("seed", range(200, 280))
+def test_what_floats_is_what_the_dense_solution_cannot_determine(seed: int) -> None:
+    """The nulls of ``solve``, bus by bus and phase by phase, stubs included."""
+    rng = np.random.default_rng([seed, 18])
+    feeder = random_feeder(rng, int(rng.integers(1, 7)), exponent=2.0)
+    bare = replace(feeder, points=(), sections=())
+    if seed % 2:  # idle units: what an open conductor leaves to float
+        bare = replace(bare, loads=tuple(load for load in bare.loads if rng.random() < 0.4))
+    line = bare.lines[int(rng.integers(len(bare.lines)))].name
+    phases = [(0,), (1, 2), (0, 2), (0, 1, 2)][int(rng.integers(4))]
+    closed = frozenset(s.name for s in bare.switches if s.closed)
+    fraction = float(rng.uniform(0.05, 0.95))
+    event = Event(open_line=line, open_fraction=fraction, open_phases=phases)
+    oracle = solve_dense(bare, closed, event, start=solve_dense(bare, closed))
+    answer = solve_break(bare, Break(line=line, fraction=fraction, phases=phases), closed)
+    normal = compile_network(bare)
+    edge, _ = locate(normal, line, fraction)
+    # the oracle calls the from-side p; ours is the upstream one
+    swap = {} if normal.upward[edge] else {f"{line}.p": f"{line}.q", f"{line}.q": f"{line}.p"}
+    ours = {
+        (swap.get(name, name), phase)
+        for name, bus in answer["buses"].items()
+        for phase in range(3)
+        if bus["after"][phase] is None
+    }
+    known = {(name, phase) for name in answer["buses"] for phase in range(3)}
+    assert ours == {own for own in oracle.floating if (swap.get(own[0], own[0]), own[1]) in known}
+
+
+def test_a_direct_load_called_like_a_transformer_keeps_its_own_connection() -> None:
+    feeder = load_feeder("paper")
+    extra = replace(
+        feeder.loads[0],
+        name="T4",
+        transformer=None,
+        place=Place(bus="R3"),
+        connection="wye",
+    )
+    twins = [
+        replace(feeder, loads=(*feeder.loads, own)) for own in (extra, replace(extra, name="X"))
+    ]
+    event = Event(open_line="R2-R3", open_fraction=0.6, open_phases=(0,))
+    answers = [solve_both(twin, frozenset(), event)[2] for twin in twins]
+    np.testing.assert_array_equal(answers[0].v, answers[1].v)

@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,14 +19,15 @@ from openphase.model.errors import OpenPhaseError
 from openphase.model.feeder_file import dump_feeder
 from openphase.studies import cli, sizing
 from openphase.studies.run.ledger import find_attempt, reserve
-from openphase.studies.run.spec import default_study, dump_study
+from openphase.studies.run.spec import NetworkState, default_study, dump_study
+from openphase.studies.sizing import population_digest
 
 NOT_COMPARED = {"log.txt", "timing.json"}
 
 RESULT_KEYS = """version seed feeder study_hash confidence attempt scenarios sections compared
     feeder_false_trips numerics"""
 SECTION_KEYS = """local remote setting_group status reason i_set_a i_set_pu v_set_pu z_set_ohm
-    dt_ms delay_ms trigger line_z1_ohm margin opens unreachable detected dependability
+    dt_ms delay_ms trigger negative_sign line_z1_ohm margin opens unreachable detected dependability
     dependability_low dependability_high security_trials false_trips false_trip_upper
     false_trips_per_year_upper classes causes nearest_false_trip fixes"""
 COMPARED_KEYS = """local remote name i_set_a v_set_pu z_set_ohm detected opens unreachable

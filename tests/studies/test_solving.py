@@ -108,7 +108,8 @@ def test_json_is_one_object_on_stdout(capsys: pytest.CaptureFixture[str]) -> Non
     answer = json.loads(capsys.readouterr().out)
     assert list(answer) == ["buses", "lines", "sections"]
     assert list(answer["sections"][0]) == [
-        "local", "remote", "di1_a", "di1_star_a", "dv1_pu", "z1_ohm", "zabc_ohm", "trip", "reason",
+        "local", "remote", "di1_a", "di1_star_a", "dv1_pu", "z1_ohm", "zabc_ohm", "di_abc_a",
+        "trip", "reason",
     ]  # fmt: skip
 
 
