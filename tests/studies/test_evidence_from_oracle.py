@@ -114,3 +114,19 @@ def test_sides_of_drawn_events() -> None:
         for t, terminal in enumerate(case.points.terminals[::2]):
             inside = terminal.local == sections[line]
             assert (seen.side[2 * t, s] == Side.PATH) == inside
+
+
+@pytest.mark.parametrize("name", ["v_error", "i_error"])
+def test_every_frame_has_errors_of_its_own(name: str) -> None:
+    case, scenarios = drawn((), DrawClass.LOAD_STEP)
+    exact = observe(case, scenarios).evidence
+    for frame in (0, 1):
+        error = np.zeros_like(scenarios.v_error)
+        error[frame, :, 0] = 0.5  # one phase: equal errors of all three have no positive sequence
+        seen = observe(case, replace(scenarios, **{name: error})).evidence
+        assert not np.isclose(seen.z1_ohm, exact.z1_ohm).all()
+        moved = seen.di1_a if name == "i_error" else seen.dv1_pu
+        still = seen.dv1_pu if name == "i_error" else seen.di1_a
+        unmoved = exact.dv1_pu if name == "i_error" else exact.di1_a
+        assert not np.isclose(moved, exact.di1_a if name == "i_error" else exact.dv1_pu).all()
+        np.testing.assert_array_equal(still, unmoved)

@@ -198,3 +198,29 @@ def test_faults_of_break_switch_and_sheet_come_together(
     assert [line.split(":")[0] for line in said[:3]] == ["--open"] * 3
     assert said[3].startswith("--close: name must be a switch of 'paper': R4, got QQ")
     assert said[4].startswith(sheet)
+
+
+def test_stubs_keep_their_names_in_a_closed_loop() -> None:
+    """Upstream is what it is with the tie open, whichever way the solver goes round."""
+    feeder = load_feeder("paper")
+    broken = parse_break("R4-R5:0.2:abc", feeder)
+    buses = solve_break(feeder, broken, frozenset({"R4"}))["buses"]
+    q, p, end = (
+        [complex(*value) for value in buses[name]["after"]]
+        for name in ("R4-R5.q", "R4-R5.p", "R4b")
+    )
+    assert q == pytest.approx(end)  # nothing flows between R4b and the break
+    assert abs(p[0] - end[0]) > 1.0
+
+
+def test_a_break_at_a_tee_leaves_the_tee_beyond_it() -> None:
+    feeder = load_feeder("paper")
+
+    def z1(fraction: float) -> complex:
+        broken = parse_break(f"R2-R3:{fraction}:a", feeder)
+        row = terminal(solve_break(feeder, broken, frozenset()), "R2", "R3")
+        return complex(*row["z1_ohm"])
+
+    at, before, behind = z1(0.25), z1(0.2499999), z1(0.2500001)
+    assert at == pytest.approx(before, rel=1e-5)
+    assert abs(at - behind) > 50  # T2 carries half of the load beyond R2
