@@ -29,11 +29,12 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
         "fastmath": {"contract"},
         "forceinline": True,
     }
-    user_s, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _FOLDER or ""
+    config: Any = numba.config
+    user_s, config.CACHE_DIR = config.CACHE_DIR, _FOLDER
     try:
         jit = numba.njit(cache=bool(_FOLDER), **options)(function)
     finally:
-        numba.config.CACHE_DIR = user_s
+        config.CACHE_DIR = user_s
     return cast("Callable[P, R]", jit)
 
 
