@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..model.symmetrical import A
+
 __all__ = ["compensated", "positive_sequence", "superimposed"]
 
 Complex = NDArray[np.complex128]
-
-A = np.exp(2j * np.pi / 3)
 
 
 def positive_sequence(abc: Complex) -> Complex:

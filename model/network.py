@@ -71,6 +71,15 @@ class Network:
         own = [k for k, piece in enumerate(self.pieces) if piece and piece.line == line]
         return sorted(own, key=lambda k: _start(self.pieces[k]))
 
+    def below(self, edge: int) -> NDArray[np.bool_]:
+        """(B,) the nodes that hang below ``edge``; none below the chord."""
+        hanging = np.zeros(len(self.nodes), np.bool_)
+        if edge < hanging.size:
+            hanging[edge] = True
+            for k in range(edge + 1, hanging.size):
+                hanging[k] = hanging[self.tree.parent[k]]
+        return hanging
+
     def line_fraction(self, edge: int, share: float) -> tuple[str, float]:
         """Line and fraction from its from-end of a place given as edge and share from above."""
         piece = self.pieces[edge]

@@ -100,17 +100,8 @@ def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: 
     """Nominal kW beyond the section's first edge, or beyond its last."""
     path = [int(k) for k in np.flatnonzero(terminal.on_path)]
     edge = min(path) if nearest else max(path)
-    below = {edge}
-    for k in range(edge + 1, len(network.nodes)):
-        if int(network.tree.parent[k]) in below:
-            below.add(k)
-    return float(
-        sum(
-            load.kw
-            for load, unit in zip(feeder.loads, network.tree.load_unit, strict=True)
-            if int(network.tree.unit_node[unit]) in below
-        )
-    )
+    loaded = network.below(edge)[network.tree.unit_node[network.tree.load_unit]]
+    return float(sum(load.kw for load, own in zip(feeder.loads, loaded, strict=True) if own))
 
 
 def _assumed(feeder: Feeder) -> list[str]:

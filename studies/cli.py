@@ -26,7 +26,7 @@ VERBS = {
 }
 """Group, verb, and what the verb does in a line: ``--help`` is printed from here."""
 
-ANSWERED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
 _EXIT_CODES = """\
 exit codes:

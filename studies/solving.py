@@ -22,7 +22,7 @@ from ..model.fields import did_you_mean
 from ..model.network import Network, compile_network, locate
 from ..model.parts import Feeder
 from ..model.points import Points, find_points, into_line
-from ..model.solve import all_probes, solve, steady_state
+from ..model.solve import solve, steady_state
 from ..model.states import NOT_CONVERGED, Answer
 from .run.store import as_json
 from .settings_file import read_settings
@@ -142,7 +142,7 @@ def solve_break(
     if not all(np.isfinite(part).all() for part in (before.v, before.i, after.v, after.i)):
         raise OpenPhaseError(f"{feeder.name}: no finite solution; look for absurd values")
     lost = _lost_phases(broken, int(after.flags[0]))
-    dark = _below(network, edge)
+    dark = network.below(edge)
     buses = {}
     for name in sorted(_bus_names(feeder), key=network.nodes.index):
         node = network.node(name)
@@ -182,16 +182,6 @@ def _lost_phases(broken: Break, flags: int) -> tuple[int, ...]:
     return tuple(a for a in broken.phases if flags & (UNDEFINED << a))
 
 
-def _below(network: Network, edge: int) -> NDArray[np.bool_]:
-    """Nodes that hang below ``edge``."""
-    below = np.zeros(len(network.nodes), np.bool_)
-    if edge < below.size:
-        below[edge] = True
-        for k in range(edge + 1, below.size):
-            below[k] = below[network.tree.parent[k]]
-    return below
-
-
 def _stub_names(feeder: Feeder, network: Network, edge: int, broken: Break) -> tuple[str, str]:
     """Names of the solver's upper and lower stub: p is the upstream one in the normal state."""
     normal = compile_network(feeder)
@@ -221,13 +211,9 @@ def _line_currents(network: Network, answer: Answer, line: str) -> dict[str, Any
     }
 
 
-def _phasors(network: Network, points: Points, frames: tuple[Answer, Answer]) -> Phasors:
+def _phasors(points: Points, frames: tuple[Answer, Answer]) -> Phasors:
     """What perfect instruments at the points report."""
-    probe = all_probes(network)
-    place = [
-        int(np.flatnonzero((probe.i_edge == k) & (probe.i_below == low))[0])
-        for k, low in zip(points.edge, points.below, strict=True)
-    ]
+    place = 2 * points.edge + points.below  # as all_probes looks: upper end, then lower end
     into = into_line(points)[:, None, None]
     return Phasors(
         v=np.stack([frame.v[points.node] for frame in frames]),
@@ -245,7 +231,7 @@ def _sections(
     if not feeder.sections:
         return []
     points = find_points(feeder, network)
-    phasors = _phasors(network, points, frames)
+    phasors = _phasors(points, frames)
     v1, i1 = positive_sequence(phasors.v), positive_sequence(phasors.i)
     star = compensated(i1[1], i1[0], v1[1], v1[0])
     rows = []

@@ -71,9 +71,7 @@ def train_block(case: Case, which: BlockId, size: int = BLOCK) -> Trained:
     grid, margin = device_grid(case), case.study.certificate.margin
     evidence = seen.evidence
     reach = reach_ohm(evidence, case.study.detector.negative_sign)
-    identity = np.column_stack(
-        (np.full(size, int(which.drawn)), np.full(size, which.block), np.arange(size))
-    )
+    identity = _identity(which, size)
     terminals = range(len(case.points.terminals))
     opens, stiff, false, front = [], [], [], []
     for t in terminals:
@@ -108,9 +106,7 @@ def judge_block(
     reason = np.full((ways, terminals, size), Reason.BLOCKED, np.int8)
     effective = np.zeros((len(REPORTED), terminals), np.int64)
     fronts = []
-    identity = np.column_stack(
-        (np.full(size, int(which.drawn)), np.full(size, which.block), np.arange(size))
-    )
+    identity = _identity(which, size)
     reach = reach_ohm(evidence, case.study.detector.negative_sign)
     for t in range(terminals):
         one = _only(evidence, t)
@@ -157,6 +153,13 @@ def judge_block(
             axis=1,
         ),
         sample_side=seen.side[:, kept],
+    )
+
+
+def _identity(which: BlockId, size: int) -> Int:
+    """(S, 3): class, block and index, by which fronts know their scenarios."""
+    return np.column_stack(
+        (np.full(size, int(which.drawn)), np.full(size, which.block), np.arange(size))
     )
 
 
