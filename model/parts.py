@@ -11,21 +11,30 @@ from dataclasses import dataclass
 from typing import Literal
 
 __all__ = [
+    "Capacitor",
+    "CapacitorConnection",
     "Connection",
+    "Der",
+    "DerModel",
     "Feeder",
     "Line",
     "Load",
     "LoadConnection",
+    "Neutral",
     "Place",
     "Point",
+    "Regulator",
     "Section",
     "Source",
     "Switch",
     "Transformer",
 ]
 
-Connection = Literal["Yg/Yg", "D/Yg", "Yg/D"]
+Connection = Literal["Yg/Yg", "D/Yg", "Yg/D", "Y/D", "D/D", "unknown"]
 LoadConnection = Literal["wye", "delta"]
+CapacitorConnection = Literal["wye", "delta"]
+DerModel = Literal["thevenin", "constant_current", "constant_power", "generator"]
+Neutral = Literal["solid", "resistor", "petersen", "isolated"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +52,9 @@ class Source:
 
     ``kv_ll`` is the nominal line-to-line voltage to which everything on the
     feeder is referred; the EMF is ``emf_pu`` of it, phase a at angle 0.
+    ``neutral_ohm`` stands between its neutral and earth: 0 where that is solid, a
+    resistance, or the reactance of a Petersen coil; isolated, there is no connection at all.
+    ``wires`` is 3 where no neutral goes with the lines: nothing may be connected to it then.
     """
 
     bus: str
@@ -52,6 +64,9 @@ class Source:
     z2_ohm: complex
     z0_ohm: complex
     frequency_hz: float
+    neutral: Neutral = "solid"
+    neutral_ohm: complex = 0j
+    wires: int = 4
 
     @property
     def v_phase_v(self) -> float:
@@ -61,7 +76,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A three-phase line, transposed: sequence impedances per km, no charging."""
+    """A three-phase line, transposed: sequence impedances and charging capacitances per km."""
 
     name: str
     from_bus: str
@@ -69,6 +84,8 @@ class Line:
     length_km: float
     z1_ohm_per_km: complex
     z0_ohm_per_km: complex
+    c1_nf_per_km: float = 0.0
+    c0_nf_per_km: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +95,9 @@ class Transformer:
     ``leakage_pu`` is the complex leakage on the unit's own rating, split in two
     equal halves, HV and LV. ``x0_pu`` is the zero-sequence magnetizing reactance
     (on the rating) between the halves of a Yg/Yg unit with a three-limb core; None: no such branch.
+    ``xm_pu`` is the magnetizing reactance there, of every sequence and connection; None: infinite.
+    An unknown connection is drawn by a study; without one it counts as the commonest for the
+    feeder's wires (``network.assumed_connection``).
     """
 
     name: str
@@ -86,6 +106,7 @@ class Transformer:
     rating_kva: float
     leakage_pu: complex
     x0_pu: float | None
+    xm_pu: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,6 +116,8 @@ class Load:
     Behind a transformer with a Yg LV winding it is grounded wye; behind a D winding
     it is connected between the phases; ``connection`` speaks of direct loads only.
     P and Q vary as ``|V|**exponent``: 2 constant impedance, 1 current, 0 power.
+    ``motor_share`` of it are motors: they take it in the positive sequence, are
+    ``motor_y2_y1`` times as large an admittance to the negative, and have no neutral.
     """
 
     name: str
@@ -104,6 +127,55 @@ class Load:
     kw: float
     power_factor: float
     exponent: float
+    motor_share: float = 0.0
+    motor_y2_y1: float = 6.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Der:
+    """Distributed generation behind a transformer or directly on the feeder, balanced.
+
+    It delivers ``kw`` at ``power_factor`` in the positive sequence before the event. After
+    it ``model`` says what stays as it was: the EMF behind ``z1_ohm`` ("thevenin"; "generator"
+    for a rotating machine, whose ``z2_ohm`` is another), the current, or the power. Impedances
+    are referred to the feeder's voltage; None: no path for that sequence.
+    """
+
+    name: str
+    transformer: str | None
+    place: Place | None
+    kw: float
+    power_factor: float
+    model: DerModel
+    z1_ohm: complex | None
+    z2_ohm: complex | None
+    z0_ohm: complex | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capacitor:
+    """A three-phase capacitor bank directly on the feeder: grounded wye, or delta."""
+
+    name: str
+    place: Place
+    connection: CapacitorConnection
+    kvar: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Regulator:
+    """Three single-phase autotransformers in grounded wye between two buses, without impedance.
+
+    The voltage at ``to_bus`` is ``1 + tap * step_pct / 100`` times that at ``from_bus``,
+    phase by phase.
+    """
+
+    name: str
+    from_bus: str
+    to_bus: str
+    taps: tuple[int, int, int]
+    step_pct: float
+    most_taps: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,11 +190,16 @@ class Switch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:
-    """A measuring point: V at ``bus`` and I at that end of ``line``, three phases."""
+    """A measuring point: V at ``bus`` and I into ``line`` there, three phases.
+
+    Where it stands at a switch, ``switch`` names it, and ``bus`` is the side of it on which
+    the voltage is measured: the line's own end, or the bus beyond the switch.
+    """
 
     name: str
     bus: str
     line: str
+    switch: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,3 +222,6 @@ class Feeder:
     switches: tuple[Switch, ...]
     points: tuple[Point, ...]
     sections: tuple[Section, ...]
+    ders: tuple[Der, ...] = ()
+    capacitors: tuple[Capacitor, ...] = ()
+    regulators: tuple[Regulator, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 from ..network import Network
 from ..states import State
 
-__all__ = ["Event", "Places", "apply_event", "no_event", "places_on"]
+__all__ = ["Event", "Places", "apply_event", "draw_place", "no_event", "places_on"]
 
+Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
@@ -20,17 +22,29 @@ Int = NDArray[np.int64]
 class Event:
     """One event in each of S scenarios; what does not happen is neutral.
 
-    ``edge`` is -1 where the event stands nowhere on the feeder. A load step is present
-    before the event, after it, or both with different size.
+    ``edge`` is -1 where the event stands nowhere on the feeder. What stands on it has two
+    sides, p towards the source and q: opened phases between them, admittances to earth and
+    between the phases (a-b, b-c, c-a) at p, to earth at q. Pairs have a second place, a node.
+    Admittances are siemens at nominal voltage, before the event and after it.
     """
 
     edge: Int  #: (S,)
     share: Real  #: (S,) from the edge's upper end
-    open_mask: Int  #: (S,) bit a: phase a opens
-    step_before_w: Real  #: (3, S) watts per phase at nominal voltage
-    step_after_w: Real  #: (3, S)
-    step_exponent: Real  #: (S,)
+    open_before: Int  #: (S,) bit a: phase a is open
+    open_after: Int  #: (S,)
+    earth_before_s: Complex  #: (3, S) at p
+    earth_after_s: Complex  #: (3, S)
+    exponent: Real  #: (S,) voltage exponent of what is at p to earth: 2 constant impedance
+    between_before_s: Complex  #: (3, S) at p, constant impedance
+    between_after_s: Complex  #: (3, S)
+    fallen_after_s: Complex  #: (3, S) at q to earth
+    far_node: Int  #: (S,) the second place; -1: none
+    far_before_s: Complex  #: (3, S) there to earth
+    far_after_s: Complex  #: (3, S)
     emf_factor: Real  #: (S,) on the source EMF after the event
+    tap_factor: Real  #: (R, 3, S) on the regulators' ratios after it
+    load_factor: Real  #: (L, S) on the loads after it
+    der_factor: Real  #: (D, S) on what the DER deliver after it; 0: tripped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,41 +72,78 @@ def places_on(network: Network, chosen: NDArray[np.bool_] | None = None) -> Plac
     return Places(edges=edges, length_km=network.length_km[edges])
 
 
-def no_event(size: int) -> Event:
+def draw_place(
+    rng: np.random.Generator, size: int, regions: Sequence[Places]
+) -> tuple[Int, Real]:
+    """Edges and shares: every region equally likely, within it uniform in length."""
+    region = rng.integers(len(regions), size=size)
+    edge = np.empty(size, np.int64)
+    share = np.empty(size)
+    for n, places in enumerate(regions):
+        here = region == n
+        edge[here], share[here] = places.draw(rng, int(here.sum()))
+    return edge, share
+
+
+def no_event(network: Network, size: int) -> Event:
     """An event in which nothing happens."""
+    nothing = np.zeros((3, size), np.complex128)
     return Event(
         edge=np.full(size, -1, np.int64),
         share=np.zeros(size),
-        open_mask=np.zeros(size, np.int64),
-        step_before_w=np.zeros((3, size)),
-        step_after_w=np.zeros((3, size)),
-        step_exponent=np.full(size, 2.0),
+        open_before=np.zeros(size, np.int64),
+        open_after=np.zeros(size, np.int64),
+        earth_before_s=nothing,
+        earth_after_s=nothing,
+        exponent=np.full(size, 2.0),
+        between_before_s=nothing,
+        between_after_s=nothing,
+        fallen_after_s=nothing,
+        far_node=np.full(size, -1, np.int64),
+        far_before_s=nothing,
+        far_after_s=nothing,
         emf_factor=np.ones(size),
+        tap_factor=np.ones((len(network.regulators), 3, size)),
+        load_factor=np.ones((len(network.loads), size)),
+        der_factor=np.ones((len(network.ders), size)),
     )
 
 
 def apply_event(network: Network, before: State, after: State, event: Event) -> tuple[State, State]:
     """The two states with the event between them.
 
-    ``before`` and ``after`` carry what the loads and the source do of their own accord.
+    ``before`` and ``after`` carry what the loads and the source do of their own accord. What
+    DER keep from before the event is filled in once that has been solved
+    (``machines.carried_over``).
     """
-    per_watt = 1.0 / network.tree.v_nominal_v**2
-    opened = np.where(event.open_mask != 0, event.edge, -1)
-    stepped = np.where((event.step_before_w + event.step_after_w).any(axis=0), event.edge, -1)
-    return (
-        before._replace(
-            edge=stepped,
-            share=event.share,
-            open_mask=np.zeros_like(event.open_mask),
-            step_y_s=(event.step_before_w * per_watt).astype(np.complex128),
-            step_exponent=event.step_exponent,
-        ),
-        after._replace(
-            emf_pu=after.emf_pu * event.emf_factor,
-            edge=np.maximum(opened, stepped),
-            share=event.share,
-            open_mask=event.open_mask,
-            step_y_s=(event.step_after_w * per_watt).astype(np.complex128),
-            step_exponent=event.step_exponent,
-        ),
+    ders = slice(len(network.machines) - len(network.ders), None)
+    va = after.machine_va.copy()
+    va[network.motor_row] *= event.load_factor[network.motor_load]
+    va[ders] *= event.der_factor
+    first = before._replace(
+        edge=event.edge,
+        share=event.share,
+        open_mask=event.open_before,
+        step_y_s=event.earth_before_s,
+        step_exponent=event.exponent,
+        between_y_s=event.between_before_s,
+        fallen_y_s=np.zeros_like(event.fallen_after_s),
+        far_node=event.far_node,
+        far_y_s=event.far_before_s,
     )
+    second = after._replace(
+        emf_pu=after.emf_pu * event.emf_factor,
+        ratio=after.ratio * event.tap_factor,
+        load_scale=after.load_scale * event.load_factor,
+        machine_va=va,
+        edge=event.edge,
+        share=event.share,
+        open_mask=event.open_after,
+        step_y_s=event.earth_after_s,
+        step_exponent=event.exponent,
+        between_y_s=event.between_after_s,
+        fallen_y_s=event.fallen_after_s,
+        far_node=event.far_node,
+        far_y_s=event.far_after_s,
+    )
+    return first, second
