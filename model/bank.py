@@ -1,123 +1,127 @@
-"""Transformer banks with their loads, as a 3x3 shunt at the bus they hang on.
+"""Transformer banks with what hangs on them, as a 3x3 shunt at their bus.
 
-Everything is referred to HV. The leakage of each winding pair is split into ``zh`` and
-``zl``; the load ``y`` lies across each LV winding, whichever way the windings are connected.
+Everything is referred to HV. Winding pairs are T-equivalents: half the leakage ``zh``, the
+magnetizing branch, the other half ``zl``; across each LV winding lies the load. In winding
+quantities (voltages u at HV, w at the middle, e at LV) the load draws  y e - j.
 """
 
 from __future__ import annotations
 
 from .compiled import compiled
-from .matrix3 import Matrix, Vector, reciprocal
+from .matrix3 import (
+    IDENTITY,
+    Matrix,
+    Vector,
+    add,
+    column_sums,
+    inverse,
+    outer,
+    plus_diagonal,
+    plus_everywhere,
+    product,
+    reciprocal,
+    row_sums,
+    times,
+    weighted,
+)
 
-__all__ = ["D_YG", "YG_D", "YG_YG", "bank"]
+__all__ = ["D_D", "D_YG", "YG_D", "YG_YG", "Y_D", "bank"]
 
-YG_YG, D_YG, YG_D = 0, 1, 2  #: winding connections, HV first
+YG_YG, D_YG, YG_D, Y_D, D_D = 0, 1, 2, 3, 4  #: winding connections, HV first
+
+ROOT = complex(3.0**-0.5)
+TO_DELTA: Matrix = (ROOT, -ROOT, 0j, 0j, ROOT, -ROOT, -ROOT, 0j, ROOT)  #: u = TO_DELTA V
+FROM_DELTA: Matrix = (ROOT, 0j, -ROOT, -ROOT, ROOT, 0j, 0j, -ROOT, ROOT)  #: its transpose
 
 
 @compiled
 def bank(
-    connection: int, zh: complex, zl: complex, y0: complex, y: Vector
-) -> tuple[Matrix, Matrix]:
-    """Shunt at the HV bus, and LV winding voltages per HV bus voltage.
+    connection: int, zh: complex, zl: complex, y0: complex, ym: complex, y: Matrix, j: Vector
+) -> tuple[Matrix, Vector, Matrix, Vector]:
+    """What the bank draws from its bus, and its LV winding voltages.
 
-    ``y0`` is the zero-sequence magnetizing admittance between the halves of a Yg/Yg unit.
-    A load directly on the bus is a bank without leakage: wye as Yg/Yg, delta as D/Yg.
+    ``ym`` is the magnetizing admittance of each winding pair, ``y0`` what a three-limb
+    Yg/Yg core adds to it in the zero sequence. A load directly on the bus is a bank without
+    leakage: wye as Yg/Yg, delta as D/Yg.
+
+    Returns
+    -------
+    shunt, drawn, winding, fed : matrix, vector, matrix, vector
+        The bus current is  shunt V + drawn,  the winding voltages are  winding V + fed.
     """
-    if connection == D_YG:
-        return _delta_wye(zh + zl, y)
-    if connection == YG_D:
-        return _wye_delta(zh + zl, y)
-    return _wye_wye(zh, zl, y0, y)
+    if connection >= YG_D:
+        w_y, w_j, e_w, e_j = _low_delta(zl, y, j)
+    else:
+        w_y, w_j, e_w, e_j = _low_wye(zl, y, j)
+    if ym != 0.0:
+        w_y = plus_diagonal(w_y, (ym, ym, ym))
+    if connection == YG_YG and y0 != 0.0:
+        w_y = plus_everywhere(w_y, y0 / 3.0)
+    if zh != 0.0:
+        # w = (1 + zh w_y)^-1 (u - zh w_j)
+        f = inverse(plus_diagonal(weighted(w_y, zh), (1 + 0j, 1 + 0j, 1 + 0j)))
+        u_y, u_j = product(w_y, f), times(f, w_j)
+        e_u = product(e_w, f)
+        back = times(e_u, w_j)
+        e_j = (e_j[0] - zh * back[0], e_j[1] - zh * back[1], e_j[2] - zh * back[2])
+    else:
+        u_y, u_j, e_u = w_y, w_j, e_w
+    if connection in (D_YG, D_D):
+        shunt = product(FROM_DELTA, product(u_y, TO_DELTA))
+        return shunt, times(FROM_DELTA, u_j), product(e_u, TO_DELTA), e_j
+    if connection == Y_D:
+        return _float_neutral(u_y, u_j, e_u, e_j)
+    return u_y, u_j, e_u, e_j
 
 
 @compiled
-def _wye_wye(zh: complex, zl: complex, y0: complex, y: Vector) -> tuple[Matrix, Matrix]:
-    """``w``: load behind zl. ``d``: zh above w. ``k``: what the shunt y0/3 in every entry adds.
+def _low_wye(z: complex, y: Matrix, j: Vector) -> tuple[Matrix, Vector, Matrix, Vector]:
+    """From the middle down, LV in grounded wye: e = (1 + z y)^-1 (w + z j)."""
+    if z == 0.0:
+        return y, (-j[0], -j[1], -j[2]), IDENTITY, (0j, 0j, 0j)
+    g = inverse(plus_diagonal(weighted(y, z), (1 + 0j, 1 + 0j, 1 + 0j)))
+    lost = times(g, j)
+    return (
+        product(y, g),
+        (-lost[0], -lost[1], -lost[2]),
+        g,
+        (z * lost[0], z * lost[1], z * lost[2]),
+    )
 
-    With F = diag(d) - k d d^T the voltage at the middle, Y = (diag(w) + y0/3) F.
+
+@compiled
+def _low_delta(z: complex, y: Matrix, j: Vector) -> tuple[Matrix, Vector, Matrix, Vector]:
+    """From the middle down, LV in closed delta: a circulating current makes sum(e) zero.
+
+    With G = (1 + z y)^-1 it is  z c = 1^T G (w + z j) / 1^T G 1; z must not be zero.
     """
-    g0 = reciprocal(1.0 + zl * y[0])
-    g1 = reciprocal(1.0 + zl * y[1])
-    g2 = reciprocal(1.0 + zl * y[2])
-    w0, w1, w2 = y[0] * g0, y[1] * g1, y[2] * g2
-    d0 = reciprocal(1.0 + zh * w0)
-    d1 = reciprocal(1.0 + zh * w1)
-    d2 = reciprocal(1.0 + zh * w2)
-    third = y0 / 3.0
-    spread = d0 + d1 + d2
-    share = reciprocal(1.0 + zh * third * spread)
-    k = zh * third * share
-    # d_i d_j times this is entry (i, j) of Y beyond its diagonal: third*share - ... symmetric
-    c = third * share
-    shunt = (
-        w0 * d0 + c * d0 * d0,
-        c * d0 * d1,
-        c * d0 * d2,
-        c * d1 * d0,
-        w1 * d1 + c * d1 * d1,
-        c * d1 * d2,
-        c * d2 * d0,
-        c * d2 * d1,
-        w2 * d2 + c * d2 * d2,
+    g = inverse(plus_diagonal(weighted(y, z), (1 + 0j, 1 + 0j, 1 + 0j)))
+    sums = column_sums(g)
+    share = reciprocal(sums[0] + sums[1] + sums[2])
+    e_w = add(g, outer(row_sums(g), sums, -share))
+    circulating = outer((1 + 0j, 1 + 0j, 1 + 0j), sums, share * reciprocal(z))
+    w_y = add(product(y, e_w), circulating)
+    e_j, drawn = times(e_w, j), times(w_y, j)
+    return (
+        w_y,
+        (z * drawn[0] - j[0], z * drawn[1] - j[1], z * drawn[2] - j[2]),
+        e_w,
+        (z * e_j[0], z * e_j[1], z * e_j[2]),
     )
-    winding = (
-        g0 * (d0 - k * d0 * d0),
-        -g0 * k * d0 * d1,
-        -g0 * k * d0 * d2,
-        -g1 * k * d1 * d0,
-        g1 * (d1 - k * d1 * d1),
-        -g1 * k * d1 * d2,
-        -g2 * k * d2 * d0,
-        -g2 * k * d2 * d1,
-        g2 * (d2 - k * d2 * d2),
-    )
-    return shunt, winding
 
 
 @compiled
-def _delta_wye(z: complex, y: Vector) -> tuple[Matrix, Matrix]:
-    """HV winding i lies between phases i and i+1, rated sqrt(3) times the phase voltage."""
-    g0 = reciprocal(1.0 + z * y[0])
-    g1 = reciprocal(1.0 + z * y[1])
-    g2 = reciprocal(1.0 + z * y[2])
-    b0, b1, b2 = y[0] * g0 / 3.0, y[1] * g1 / 3.0, y[2] * g2 / 3.0
-    shunt = (b0 + b2, -b0, -b2, -b0, b0 + b1, -b1, -b2, -b1, b1 + b2)
-    root = 3.0**-0.5
-    r0, r1, r2 = root * g0, root * g1, root * g2
-    zero = 0j
-    winding = (r0, -r0, zero, zero, r1, -r1, -r2, zero, r2)
-    return shunt, winding
-
-
-@compiled
-def _wye_delta(z: complex, y: Vector) -> tuple[Matrix, Matrix]:
-    """The closed LV delta forces its winding voltages to sum to zero; z must not be zero."""
-    f0 = reciprocal(1.0 + z * y[0])
-    f1 = reciprocal(1.0 + z * y[1])
-    f2 = reciprocal(1.0 + z * y[2])
-    c = reciprocal(f0 + f1 + f2)
-    e = reciprocal(z)
-    winding = (
-        f0 - c * f0 * f0,
-        -c * f0 * f1,
-        -c * f0 * f2,
-        -c * f1 * f0,
-        f1 - c * f1 * f1,
-        -c * f1 * f2,
-        -c * f2 * f0,
-        -c * f2 * f1,
-        f2 - c * f2 * f2,
+def _float_neutral(
+    u_y: Matrix, u_j: Vector, e_u: Matrix, e_j: Vector
+) -> tuple[Matrix, Vector, Matrix, Vector]:
+    """HV in wye without neutral: u = V - n, with the n at which the currents sum to zero."""
+    rows, sums = row_sums(u_y), column_sums(u_y)
+    share = reciprocal(sums[0] + sums[1] + sums[2])
+    n_j = share * (u_j[0] + u_j[1] + u_j[2])
+    windings = row_sums(e_u)
+    return (
+        add(u_y, outer(rows, sums, -share)),
+        (u_j[0] - rows[0] * n_j, u_j[1] - rows[1] * n_j, u_j[2] - rows[2] * n_j),
+        add(e_u, outer(windings, sums, -share)),
+        (e_j[0] - windings[0] * n_j, e_j[1] - windings[1] * n_j, e_j[2] - windings[2] * n_j),
     )
-    ce = c * e
-    shunt = (
-        y[0] * f0 + ce * f0 * f0,
-        ce * f0 * f1,
-        ce * f0 * f2,
-        ce * f1 * f0,
-        y[1] * f1 + ce * f1 * f1,
-        ce * f1 * f2,
-        ce * f2 * f0,
-        ce * f2 * f1,
-        y[2] * f2 + ce * f2 * f2,
-    )
-    return shunt, winding

@@ -1,10 +1,10 @@
 """Open phases: projections of the three-phase equations at a break.
 
-Below the break the network draws  I = W V + X V_fork  from it, and  I' = X' V + U V_fork
-from the loop's fork (X, X', U are zero where the break is in no loop). An open phase a has
-no current, so
+Below the break the network draws  I = W V + X V_fork + x  from it, and  I' = X' V + U V_fork + u
+from the loop's fork (X, X', U and u are zero where the break is in no loop, x and u where no
+machine feeds in current). An open phase a has no current, so
 
-    V_a = -(sum_{b != a} w_ab V_b + x_a V_fork) / w_aa
+    V_a = -(sum_{b != a} w_ab V_b + x_ab V_fork + x_a) / w_aa
 
 replaces V_a everywhere; phase by phase, so that one, two or three phases are one thing.
 """
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled
-from .matrix3 import IDENTITY, ZERO, reciprocal, store
+from .matrix3 import IDENTITY, ZERO, reciprocal, store, store_vector
 
-__all__ = ["DEAD", "FLOATING", "UNDEFINED", "open_phases", "open_series"]
+__all__ = ["DEAD", "FLOATING", "UNDEFINED", "open_phases", "squared"]
 
 Complex = NDArray[np.complex128]
 
@@ -29,17 +29,19 @@ SINGULAR = 1e-9  #: a driving-point admittance below this share of max|W| counts
 
 
 @compiled
-def open_phases(mask: int, here: Complex) -> int:
+def open_phases(mask: int, here: Complex, here_j: Complex) -> int:
     """Open the phases in ``mask``; returns flags.
 
-    ``here`` (7, 3, 3) holds W, X, X', U, changed in place, and receives P and H: the
-    voltage below the break is P V + H V_fork, V the voltage above it. A phase that is
-    connected to nothing or to no earth below gets zero volts and a flag. The last slot
-    is scratch.
+    ``here`` (7, 3, 3) holds W, X, X', U and ``here_j`` (3, 3) x and u, changed in place; they
+    receive P, H and h: the voltage below the break is P V + H V_fork + h, V the voltage
+    above it. A phase that is connected to nothing or to no earth below gets zero volts and a
+    flag. The last slot of ``here`` is scratch.
     """
     w, x, xt, u, p, h, row = here[0], here[1], here[2], here[3], here[4], here[5], here[6]
+    x_j, u_j, h_j = here_j[0], here_j[1], here_j[2]
     store(here, 4, IDENTITY)
     store(here, 5, ZERO)
+    store_vector(here_j, 2, (0j, 0j, 0j))
     largest = 0.0
     for i in range(3):
         for j in range(3):
@@ -53,7 +55,7 @@ def open_phases(mask: int, here: Complex) -> int:
     for a in range(3):
         if not mask & (1 << a):
             continue
-        # V_a = row[0] V + row[1] V_fork
+        # V_a = row[0] V + row[1] V_fork + row_j
         if squared(w[a, a]) <= limit:
             flags |= UNDEFINED << a
             flags |= DEAD if empty & (1 << a) else FLOATING
@@ -62,8 +64,10 @@ def open_phases(mask: int, here: Complex) -> int:
                     flags |= UNDEFINED << i
             for j in range(3):
                 row[0, j] = row[1, j] = 0.0
+            row_j = 0j
         else:
             scale = -reciprocal(w[a, a])
+            row_j = scale * x_j[a]
             for j in range(3):
                 row[0, j] = scale * w[a, j]
                 row[1, j] = scale * x[a, j]
@@ -77,9 +81,13 @@ def open_phases(mask: int, here: Complex) -> int:
                 u[i, j] += from_xt * row[1, j]
                 p[i, j] += from_p * row[0, j]
                 h[i, j] += from_p * row[1, j]
+            x_j[i] += from_w * row_j
+            u_j[i] += from_xt * row_j
+            h_j[i] += from_p * row_j
             w[i, a] = xt[i, a] = p[i, a] = 0.0
         for j in range(3):
             w[a, j] = x[a, j] = 0.0
+        x_j[a] = 0.0
     return flags
 
 
@@ -87,18 +95,3 @@ def open_phases(mask: int, here: Complex) -> int:
 def squared(value: complex) -> float:
     """``|value|**2``."""
     return value.real * value.real + value.imag * value.imag
-
-
-@compiled
-def open_series(mask: int, here: Complex) -> None:
-    """Open phases of a series admittance: slot 0 of ``here`` (n, 3, 3), in place."""
-    w = here[0]
-    for a in range(3):
-        if mask & (1 << a):
-            scale = reciprocal(w[a, a])
-            for i in range(3):
-                for j in range(3):
-                    if i != a and j != a:
-                        w[i, j] -= w[i, a] * w[a, j] * scale
-            for i in range(3):
-                w[i, a] = w[a, i] = 0.0

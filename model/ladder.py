@@ -15,9 +15,12 @@ from the fork. Past a series impedance
     V = F V_parent + H V_fork,   H = -F Z X,
     W = Y F,   X += Y H,   U += X' H,   X' = X' F.
 
-An event node stands on any edge, a share of Z above it and the rest below. A load step is
-a shunt there; open phases are the projections of ``breaks``, between the upper stub p and
-the lower stub q.
+Machines feed in currents that no voltage drives: they add a last column to X and U, hence to
+H, which stands in vectors of its own (x, u, h below, ``..._j`` in the workspace).
+
+An event node stands on any edge, a share of Z above it and the rest below. It has two sides,
+the upper stub p and the lower stub q, each with a shunt; open phases between them are the
+projections of ``breaks``.
 
 Compiled functions take one scenario of a block and write into its workspace; ``solve`` is
 the door for everybody else.
@@ -29,18 +32,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bank import bank
-from .breaks import DEAD, open_phases, open_series
+from .breaks import DEAD, FLOATING, SINGULAR, open_phases, squared
 from .compiled import compiled
 from .matrix3 import (
     ZERO,
     Matrix,
     Vector,
     add,
+    column_sums,
     inverse,
     load,
     load_vector,
+    minus,
+    plus,
     plus_diagonal,
     product,
+    reciprocal,
     scaled,
     store,
     store_vector,
@@ -50,6 +57,7 @@ from .states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 
 __all__ = ["solve_block"]
 
+Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
@@ -70,34 +78,136 @@ def carry(
 
 
 @compiled
+def carry_current(
+    y: Matrix, z: Matrix, f: Matrix, x_j: Vector, xt: Matrix, u_j: Vector
+) -> tuple[Vector, Vector, Vector]:
+    """The last column of H, X and U past ``z`` above ``y``; ``xt`` is X' below ``z``."""
+    h_j = minus(times(f, times(z, x_j)))
+    return h_j, plus(x_j, times(y, h_j)), plus(u_j, times(xt, h_j))
+
+
+@compiled
 def set_admittances(
     tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
 ) -> None:
-    """Node and step admittances of scenario ``s`` at the winding voltages ``unit_v_pu``."""
-    y, g, unit_y, step_y = work.y, work.g, work.unit_y, work.step_y
-    load_unit, load_y, unit_node = tree.load_unit, tree.load_y_s, tree.unit_node
-    zh, zl, y0 = tree.unit_zh_ohm, tree.unit_zl_ohm, tree.unit_y0_s
-    load_scale, exponent, connection = state.load_scale, state.exponent, state.connection
+    """What hangs on every node and on the event node, at the winding voltages ``unit_v_pu``."""
+    set_loads(tree, state, work, s, unit_v_pu, floor_pu)
+    y, y_j = work.y, work.y_j
+    unit_node = tree.unit_node
     for k in range(y.shape[0]):
-        store(y, k, ZERO)
+        store(y, k, load(tree.shunt_s, k))
+        store_vector(y_j, k, (0j, 0j, 0j))
     for unit in range(unit_node.size):
-        store_vector(unit_y, unit, (0j, 0j, 0j))
+        node = unit_node[unit]
+        shunt, drawn, winding, fed = bank(
+            state.connection[unit, s],
+            tree.unit_zh_ohm[unit],
+            tree.unit_zl_ohm[unit],
+            tree.unit_y0_s[unit],
+            tree.unit_ym_s[unit],
+            load(work.unit_y, unit),
+            load_vector(work.unit_j, unit),
+        )
+        store(y, node, add(load(y, node), shunt))
+        store_vector(y_j, node, plus(load_vector(y_j, node), drawn))
+        store(work.g, unit, winding)
+        store_vector(work.g_j, unit, fed)
+    if tree.charged:
+        add_charging(tree, work, state.edge[s])
+    node = state.far_node[s]
+    if node >= 0:
+        for i in range(3):
+            y[node, i, i] += state.far_y_s[i, s]
+    set_event_shunts(tree, state, work, s, unit_v_pu, floor_pu)
+
+
+@compiled
+def set_loads(
+    tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
+) -> None:
+    """Admittance across the LV windings of every unit, and the current fed in there."""
+    unit_y, unit_j = work.unit_y, work.unit_j
+    load_unit, load_y, machine_unit = tree.load_unit, tree.load_y_s, tree.machine_unit
+    load_scale, exponent = state.load_scale, state.exponent
+    for unit in range(unit_y.shape[0]):
+        store(unit_y, unit, ZERO)
+        store_vector(unit_j, unit, (0j, 0j, 0j))
     for n in range(load_unit.size):
         unit = load_unit[n]
         nominal = load_y[n] * load_scale[n, s]
         power = exponent[n, s] - 2.0
         for i in range(3):
-            unit_y[unit, i] += nominal * voltage_factor(unit_v_pu[unit, i], power, floor_pu)
-    for unit in range(unit_node.size):
-        node = unit_node[unit]
-        shunt, winding = bank(
-            connection[unit, s], zh[unit], zl[unit], y0[unit], load_vector(unit_y, unit)
+            unit_y[unit, i, i] += nominal * voltage_factor(unit_v_pu[unit, i], power, floor_pu)
+    turn = complex(-0.5, 0.75**0.5)
+    for m in range(machine_unit.size):
+        unit = machine_unit[m]
+        power = state.machine_exponent[m, s] - 2.0
+        taken = state.machine_va[m, s].conjugate() / (3.0 * tree.v_nominal_v**2)
+        y0, y2 = state.machine_y_s[m, 0, s], state.machine_y_s[m, 2, s]
+        y1 = state.machine_y_s[m, 1, s] + taken * voltage_factor(
+            unit_v_pu[unit, 3], power, floor_pu
         )
-        store(y, node, add(load(y, node), shunt))
-        store(g, unit, winding)
+        own = (y0 + y1 + y2) / 3.0
+        ahead = (y0 + turn * y1 + turn.conjugate() * y2) / 3.0
+        behind = (y0 + turn.conjugate() * y1 + turn * y2) / 3.0
+        add_circulant(unit_y, unit, own, ahead, behind)
+        j = state.machine_j_a[m, s]
+        store_vector(
+            unit_j, unit, plus(load_vector(unit_j, unit), (j, j * turn.conjugate(), j * turn))
+        )
+
+
+@compiled
+def add_circulant(stack: Complex, k: int, own: complex, ahead: complex, behind: complex) -> None:
+    """Add to matrix k the one with ``own`` on its diagonal and ``ahead`` right of it."""
+    matrix = (own, ahead, behind, behind, own, ahead, ahead, behind, own)
+    store(stack, k, add(load(stack, k), matrix))
+
+
+@compiled
+def add_charging(tree: Tree, work: Work, edge: int) -> None:
+    """Half of every edge's charging at its ends; of the event's edge the parts beyond it."""
+    y = work.y
+    last = tree.parent.size
+    for k in range(1, last + (1 if tree.tail >= 0 else 0)):
+        if k == edge:
+            continue
+        half = load(tree.end_y_s, k)
+        upper, lower = (tree.tail, tree.fork) if k == last else (tree.parent[k], k)
+        store(y, upper, add(load(y, upper), half))
+        store(y, lower, add(load(y, lower), half))
+
+
+@compiled
+def set_event_shunts(
+    tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
+) -> None:
+    """Shunts at p and q; and the charging of the two parts of the event's edge."""
+    event_y, edge, share = work.event_y, state.edge[s], state.share[s]
+    store(event_y, 0, ZERO)
+    store(event_y, 1, ZERO)
+    if edge < 0:
+        return
     power = state.step_exponent[s] - 2.0
     for i in range(3):
-        step_y[0, i] = state.step_y_s[i, s] * voltage_factor(unit_v_pu[-1, i], power, floor_pu)
+        following = (i + 1) % 3
+        between = state.between_y_s[i, s]
+        event_y[0, i, i] += between + state.step_y_s[i, s] * voltage_factor(
+            unit_v_pu[-1, i], power, floor_pu
+        )
+        event_y[0, following, following] += between
+        event_y[0, i, following] -= between
+        event_y[0, following, i] -= between
+        event_y[1, i, i] += state.fallen_y_s[i, s]
+    if tree.charged:
+        half = load(tree.end_y_s, edge)
+        above, below = scaled(half, share), scaled(half, 1.0 - share)
+        last = tree.parent.size
+        upper, lower = (tree.tail, tree.fork) if edge == last else (tree.parent[edge], edge)
+        store(event_y, 0, add(load(event_y, 0), above))
+        store(event_y, 1, add(load(event_y, 1), below))
+        store(work.y, upper, add(load(work.y, upper), above))
+        store(work.y, lower, add(load(work.y, lower), below))
 
 
 @compiled
@@ -107,119 +217,187 @@ def voltage_factor(v_pu: float, power: float, floor_pu: float) -> float:
 
 
 @compiled
-def climb(tree: Tree, work: Work, edge: int, share: float, mask: int) -> int:
+def climb(tree: Tree, state: State, work: Work, s: int) -> int:
     """Eliminate every node from the leaves to the source; returns flags.
 
     ``work.y`` holds each node's own admittance and becomes the admittance below it.
     """
-    parents, z_all, in_loop, fork = tree.parent, tree.z_ohm, tree.in_loop, tree.fork
-    y_all, f_all, w_all, h_all, x_all = work.y, work.f, work.w, work.h, work.x
-    fill = work.fill
+    parents, in_loop, fork = tree.parent, tree.in_loop, tree.fork
+    y_all, w_all, x_all, fill = work.y, work.w, work.x, work.fill
+    edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
     last = parents.size
+    sourced = tree.machine_unit.size > 0
     flags = 0
     for k in range(last - 1, -1, -1):
         if k == tree.tail:
-            if edge == last:
-                chord(tree, work, share, mask)
-            else:
-                chord(tree, work, 1.0, 0)
-        y = load(y_all, k)
-        z = load(z_all, k)
-        looped = in_loop[k]
+            flags |= climb_chord(tree, work, edge == last, share, mask)
+        y, looped = load(y_all, k), in_loop[k]
+        x_j = load_vector(work.y_j, k)
         if k == edge:
-            flags |= climb_event(work, k, y, z, looped, share, mask)
+            z = load(tree.z_ohm, k)
+            flags |= climb_event(work, k, y, z, share, mask, looped, x_j)
         else:
-            f, w = up(y, z)
-            store(f_all, k, f)
-            store(w_all, k, w)
-            if looped:
-                # X of the node below in the chain stands in this node's own slot
-                h, x, xt, u = carry(y, z, f, load(x_all, k), load(fill, 0), load(fill, 1))
-                store(h_all, k, h)
-                store(x_all, k, x)
-                store(fill, 0, xt)
-                store(fill, 1, u)
+            climb_edge(work, k, y, load(tree.z_ohm, k), looped, sourced, x_j)
+            if tree.regulator[k] >= 0:
+                regulate(work, k, state.ratio, tree.regulator[k], s, looped)
         parent = parents[k]
         if parent < 0:
             continue
         total = add(load(y_all, parent), load(w_all, k))
+        drawn = plus(load_vector(work.y_j, parent), load_vector(work.x_j, k))
         if looped and parent == fork:
-            x = load(x_all, k)
-            total = add(add(total, x), add(load(fill, 0), load(fill, 1)))
+            total = add(add(total, load(x_all, k)), add(load(fill, 0), load(fill, 1)))
+            drawn = plus(drawn, load_vector(work.fill_j, 0))
         elif looped:
+            # X of the node below in the chain stands in this node's own slot
             store(x_all, parent, load(x_all, k))
         store(y_all, parent, total)
+        store_vector(work.y_j, parent, drawn)
     return flags
+
+
+@compiled
+def climb_edge(
+    work: Work, k: int, y: Matrix, z: Matrix, looped: bool, sourced: bool, x_j: Vector
+) -> None:
+    """Eliminate edge k."""
+    f, w = up(y, z)
+    store(work.f, k, f)
+    store(work.w, k, w)
+    xt = load(work.fill, 0) if looped else ZERO
+    if sourced:
+        h_j, x_j, u_j = carry_current(y, z, f, x_j, xt, load_vector(work.fill_j, 0))
+        store_vector(work.h_j, k, h_j)
+        if looped:
+            store_vector(work.fill_j, 0, u_j)
+    store_vector(work.x_j, k, x_j)
+    if looped:
+        h, x, xt, u = carry(y, z, f, load(work.x, k), xt, load(work.fill, 1))
+        store(work.h, k, h)
+        store(work.x, k, x)
+        store(work.fill, 0, xt)
+        store(work.fill, 1, u)
+
+
+@compiled
+def regulate(work: Work, k: int, ratio: Real, row: int, s: int, looped: bool) -> None:
+    """Put a regulator at the upper end of edge k, which has been eliminated."""
+    f, w, x, x_j, xt = work.f[k], work.w[k], work.x[k], work.x_j[k], work.fill[0]
+    for j in range(3):
+        t = ratio[row, j, s]
+        for i in range(3):
+            f[i, j] *= t
+            w[i, j] *= t
+            if looped:
+                xt[i, j] *= t
+    for i in range(3):
+        t = ratio[row, i, s]
+        x_j[i] *= t
+        for j in range(3):
+            w[i, j] *= t
+            if looped:
+                x[i, j] *= t
 
 
 @compiled
 def climb_event(
-    work: Work, k: int, y: Matrix, z: Matrix, looped: bool, share: float, mask: int
+    work: Work, k: int, y: Matrix, z: Matrix, share: float, mask: int, looped: bool, x_j: Vector
 ) -> int:
     """Eliminate edge k with the event node on it; returns flags."""
-    event, here = work.event, work.here
-    z_low, z_up = scaled(z, 1.0 - share), scaled(z, share)
-    flags = 0
+    here, here_j = work.here, work.here_j
+    z_low = scaled(z, 1.0 - share)
     f, w = up(y, z_low)
     h = x = xt = u = ZERO
+    u_j = (0j, 0j, 0j)
     if looped:
-        h, x, xt, u = carry(y, z_low, f, load(work.x, k), load(work.fill, 0), load(work.fill, 1))
-    store(event, 4, f)
-    store(event, 5, h)
-    if mask:
-        store(here, 0, w)
-        store(here, 1, x)
-        store(here, 2, xt)
-        store(here, 3, u)
-        flags = open_phases(mask, here)
-        if mask == 7 and not looped:
-            flags |= DEAD
-        w, x, xt, u = load(here, 0), load(here, 1), load(here, 2), load(here, 3)
-        store(event, 2, load(here, 4))
-        store(event, 3, load(here, 5))
-    y = plus_diagonal(w, load_vector(work.step_y, 0))
-    f, w = up(y, z_up)
-    h = ZERO
+        xt, u, u_j = load(work.fill, 0), load(work.fill, 1), load_vector(work.fill_j, 0)
+    h_j, x_j, u_j = carry_current(y, z_low, f, x_j, xt, u_j)
     if looped:
-        h, x, xt, u = carry(y, z_up, f, x, xt, u)
-        store(work.x, k, x)
-        store(work.fill, 0, xt)
-        store(work.fill, 1, u)
-    store(event, 0, f)
-    store(event, 1, h)
-    store(work.w, k, w)
+        h, x, xt, u = carry(y, z_low, f, load(work.x, k), xt, u)
+    store(work.event, 4, f)
+    store(work.event, 5, h)
+    store_vector(work.event_j, 2, h_j)
+    store(here, 0, w)
+    store(here, 1, x)
+    store(here, 2, xt)
+    store(here, 3, u)
+    store_vector(here_j, 0, x_j)
+    store_vector(here_j, 1, u_j)
+    fed = x_j[0] != 0.0 or x_j[1] != 0.0 or x_j[2] != 0.0
+    flags = cross(work, scaled(z, share), mask, 1)
+    if mask == 7 and not looped and not fed:
+        flags |= DEAD
+    store(work.w, k, load(here, 0))
+    store_vector(work.x_j, k, load_vector(here_j, 0))
+    if looped:
+        store(work.x, k, load(here, 1))
+        store(work.fill, 0, load(here, 2))
+        store(work.fill, 1, load(here, 3))
+        store_vector(work.fill_j, 0, load_vector(here_j, 1))
     return flags
 
 
 @compiled
-def chord(tree: Tree, work: Work, share: float, mask: int) -> None:
-    """Add the chord, with its event if any, to the tail's Y, and start the fill.
+def cross(work: Work, z: Matrix, mask: int, below: int) -> int:
+    """Climb over the event node and the series impedance ``z`` above it; returns flags.
 
-    Closed it is the two-port  share * z,  load step to earth,  (1 - share) * z;
-    open phases carry no current, so their rows and columns vanish.
+    What is below stands in ``work.here``, and what is seen from above ``z`` replaces it.
+    ``below`` is the side that is met first: 1 for q, 0 for p.
+    """
+    here, here_j, event, event_j = work.here, work.here_j, work.event, work.event_j
+    store(here, 0, add(load(here, 0), load(work.event_y, below)))
+    flags = 0
+    if mask:
+        flags = open_phases(mask, here, here_j)
+        store(event, 2, load(here, 4))
+        store(event, 3, load(here, 5))
+        store_vector(event_j, 1, load_vector(here_j, 2))
+    y = add(load(here, 0), load(work.event_y, 1 - below))
+    f, w = up(y, z)
+    xt = load(here, 2)
+    h_j, x_j, u_j = carry_current(y, z, f, load_vector(here_j, 0), xt, load_vector(here_j, 1))
+    h, x, xt, u = carry(y, z, f, load(here, 1), xt, load(here, 3))
+    store(event, 0, f)
+    store(event, 1, h)
+    store_vector(event_j, 0, h_j)
+    store(here, 0, w)
+    store(here, 1, x)
+    store(here, 2, xt)
+    store(here, 3, u)
+    store_vector(here_j, 0, x_j)
+    store_vector(here_j, 1, u_j)
+    return flags
+
+
+@compiled
+def climb_chord(tree: Tree, work: Work, happening: bool, share: float, mask: int) -> int:
+    """Add the chord to the tail's Y and start the fill; returns flags.
+
+    An event on it is climbed over from the farther end, so that what is inverted is never
+    the small part of the impedance.
     """
     last = tree.parent.size
+    here = work.here
     z = load(tree.z_ohm, last)
-    if mask:
-        store(work.here, 0, inverse(z))
-        open_series(mask, work.here)
-        w = load(work.here, 0)
-        x = xt = scaled(w, -1.0)
-        u = w
+    flags = 0
+    if happening:
+        far = 1.0 - share if share <= 0.5 else share
+        w = inverse(scaled(z, far))
     else:
-        step = load_vector(work.step_y, 0)
-        if share == 1.0:
-            step = (0j, 0j, 0j)
-        middle = plus_diagonal(ZERO, step)
-        to_step = product(z, middle)
-        a = plus_diagonal(scaled(to_step, share), (1 + 0j, 1 + 0j, 1 + 0j))
-        d = plus_diagonal(scaled(product(middle, z), 1.0 - share), (1 + 0j, 1 + 0j, 1 + 0j))
-        b = add(z, scaled(product(to_step, z), share * (1.0 - share)))
-        b_inverse = inverse(b)
-        w = product(d, b_inverse)
-        x = plus_diagonal(scaled(product(w, a), -1.0), step)
-        xt = scaled(b_inverse, -1.0)
-        u = product(b_inverse, a)
+        w = inverse(z)
+    away = scaled(w, -1.0)
+    store(here, 0, w)
+    store(here, 1, away)
+    store(here, 2, away)
+    store(here, 3, w)
+    store_vector(work.here_j, 0, (0j, 0j, 0j))
+    store_vector(work.here_j, 1, (0j, 0j, 0j))
+    if happening:
+        flags = cross(work, scaled(z, 1.0 - far), mask, 1 if share <= 0.5 else 0)
+    # seen from the tail: I = W V + X V_fork, and from the fork: I' = X' V + U V_fork
+    w, x, xt, u = load(here, 0), load(here, 1), load(here, 2), load(here, 3)
+    if happening and share > 0.5:
+        w, x, xt, u = u, xt, x, w
     store(work.w, last, w)
     store(work.x, last, x)
     store(work.chord_end, 0, xt)
@@ -227,59 +405,116 @@ def chord(tree: Tree, work: Work, share: float, mask: int) -> None:
     store(work.x, tree.tail, x)
     store(work.fill, 0, xt)
     store(work.fill, 1, u)
+    store_vector(work.fill_j, 0, (0j, 0j, 0j))
     store(work.y, tree.tail, add(load(work.y, tree.tail), w))
+    return flags
 
 
 @compiled
 def both(a: Matrix, v: Vector, b: Matrix, v_fork: Vector) -> Vector:
     """``a @ v + b @ v_fork``."""
-    one, two = times(a, v), times(b, v_fork)
-    return (one[0] + two[0], one[1] + two[1], one[2] + two[2])
+    return plus(times(a, v), times(b, v_fork))
 
 
 @compiled
-def descend(tree: Tree, work: Work, edge: int, share: float, mask: int) -> None:
+def lift_neutral(work: Work) -> int:
+    """Shift the EMF (last row of V) so that the source's currents sum to zero; returns flags."""
+    last = work.y.shape[0]
+    w, emf = load(work.w, 0), load_vector(work.v, last)
+    sums, current = column_sums(w), plus(times(w, emf), load_vector(work.x_j, 0))
+    total = sums[0] + sums[1] + sums[2]
+    largest = 0.0
+    for i in range(9):
+        largest = max(largest, squared(w[i]))
+    if squared(total) <= SINGULAR**2 * largest:
+        return FLOATING
+    shift = -(current[0] + current[1] + current[2]) * reciprocal(total)
+    store_vector(work.v, last, plus(emf, (shift, shift, shift)))
+    return 0
+
+
+@compiled
+def descend(tree: Tree, state: State, work: Work, s: int) -> None:
     """Voltages and currents from the source to the leaves, and the stubs of the event node."""
     parents, in_loop, fork = tree.parent, tree.in_loop, tree.fork
-    v_all, f_all, h_all, w_all, x_all = work.v, work.f, work.h, work.w, work.x
-    i_up, i_low, stub, event = work.i_up, work.i_low, work.stub, work.event
+    v_all, i_up, i_low = work.v, work.i_up, work.i_low
+    edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
     last = parents.size
+    sourced = tree.machine_unit.size > 0
     for k in range(last):
         above = load_vector(v_all, parents[k] if k else last)
         looped = in_loop[k]
         v_fork = load_vector(v_all, fork) if looped else (0j, 0j, 0j)
         if looped:
-            current = both(load(w_all, k), above, load(x_all, k), v_fork)
+            current = both(load(work.w, k), above, load(work.x, k), v_fork)
         else:
-            current = times(load(w_all, k), above)
+            current = times(load(work.w, k), above)
+        if sourced:
+            current = plus(current, load_vector(work.x_j, k))
         store_vector(i_up, k, current)
-        store_vector(i_low, k, current)
         if k == edge:
-            v = both(load(event, 0), above, load(event, 1), v_fork)
-            store_vector(stub, 0, v)
-            for i in range(3):
-                i_low[k, i] -= work.step_y[0, i] * stub[0, i]
-            if mask:
-                v = both(load(event, 2), v, load(event, 3), v_fork)
-            store_vector(stub, 1, v)
-            v = both(load(event, 4), v, load(event, 5), v_fork)
-        elif looped:
-            v = both(load(f_all, k), above, load(h_all, k), v_fork)
+            v = descend_event(work, 0, above, v_fork, mask)
+            v = plus(
+                both(load(work.event, 4), v, load(work.event, 5), v_fork),
+                load_vector(work.event_j, 2),
+            )
+            lost = plus(
+                times(load(work.event_y, 0), load_vector(work.stub, 0)),
+                times(load(work.event_y, 1), load_vector(work.stub, 1)),
+            )
+            current = plus(current, minus(lost))
         else:
-            v = times(load(f_all, k), above)
+            if looped:
+                v = both(load(work.f, k), above, load(work.h, k), v_fork)
+            else:
+                v = times(load(work.f, k), above)
+            if sourced:
+                v = plus(v, load_vector(work.h_j, k))
+        store_vector(i_low, k, current)
+        row = tree.regulator[k]
+        if row >= 0:
+            for i in range(3):
+                i_low[k, i] /= state.ratio[row, i, s]
         store_vector(v_all, k, v)
     if tree.tail >= 0:
         v_tail, v_fork = load_vector(v_all, tree.tail), load_vector(v_all, fork)
-        into = both(load(w_all, last), v_tail, load(x_all, last), v_fork)
+        into = both(load(work.w, last), v_tail, load(work.x, last), v_fork)
         back = both(load(work.chord_end, 0), v_tail, load(work.chord_end, 1), v_fork)
         store_vector(i_up, last, into)
-        store_vector(i_low, last, (-back[0], -back[1], -back[2]))
-        if edge == last:
-            z = load(tree.z_ohm, last)
-            drop, rise = times(z, into), times(z, back)
-            for i in range(3):
-                stub[0, i] = v_tail[i] - share * drop[i]
-                stub[1, i] = v_fork[i] - (1.0 - share) * rise[i]
+        store_vector(i_low, last, minus(back))
+        if edge == last and share <= 0.5:
+            descend_event(work, 0, v_tail, v_fork, mask)
+        elif edge == last:
+            descend_event(work, 1, v_fork, v_tail, mask)
+    if tree.charged:
+        add_charging_currents(tree, work, edge, share)
+
+
+@compiled
+def descend_event(work: Work, near: int, above: Vector, v_fork: Vector, mask: int) -> Vector:
+    """Voltages of both stubs, ``near`` (0 for p) first; returns that of the other."""
+    event, event_j = work.event, work.event_j
+    v = plus(both(load(event, 0), above, load(event, 1), v_fork), load_vector(event_j, 0))
+    store_vector(work.stub, near, v)
+    if mask:
+        v = plus(both(load(event, 2), v, load(event, 3), v_fork), load_vector(event_j, 1))
+    store_vector(work.stub, 1 - near, v)
+    return v
+
+
+@compiled
+def add_charging_currents(tree: Tree, work: Work, edge: int, share: float) -> None:
+    """The currents at an edge's ends include what charges that end of it."""
+    last = tree.parent.size
+    for k in range(1, last + (1 if tree.tail >= 0 else 0)):
+        half = load(tree.end_y_s, k)
+        upper, lower = (tree.tail, tree.fork) if k == last else (tree.parent[k], k)
+        first = times(half, load_vector(work.v, upper))
+        second = times(half, load_vector(work.v, lower))
+        above, below = (share, 1.0 - share) if k == edge else (1.0, 1.0)
+        for i in range(3):
+            work.i_up[k, i] += above * first[i]
+            work.i_low[k, i] -= below * second[i]
 
 
 @compiled
@@ -288,17 +523,22 @@ def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, fi
 
     From the second pass on the step follows the secant through this pass and the last
     (Anderson's mixing of depth one), which also ends cycles and creeping near collapse.
-    ``history`` (3, U + 1, 3): the last pass's voltages and gaps, and this pass's gaps.
+    ``history`` (3, U + 1, 4): the last pass's voltages and gaps, and this pass's gaps.
     """
     units = tree.unit_node.size
+    last = 4 if tree.machine_unit.size > 0 else 3
     change = along = across = 0.0
     for unit in range(units + 1):
         if unit < units:
-            v = times(load(work.g, unit), load_vector(work.v, tree.unit_node[unit]))
+            v = plus(
+                times(load(work.g, unit), load_vector(work.v, tree.unit_node[unit])),
+                load_vector(work.g_j, unit),
+            )
         else:
             v = load_vector(work.stub, 0)
-        for i in range(3):
-            size = np.sqrt(v[i].real ** 2 + v[i].imag ** 2) / tree.v_nominal_v
+        for i in range(last):
+            value = v[i] if i < 3 else positive(v)
+            size = np.sqrt(value.real**2 + value.imag**2) / tree.v_nominal_v
             gap = size - unit_v_pu[unit, i]
             turn = gap - history[1, unit, i]
             change = max(change, abs(gap))
@@ -307,13 +547,31 @@ def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, fi
             history[2, unit, i] = gap
     back = 0.0 if first or across == 0.0 else along / across
     for unit in range(units + 1):
-        for i in range(3):
+        for i in range(last):
             v_pu, gap = unit_v_pu[unit, i], history[2, unit, i]
             moved = v_pu - history[0, unit, i] + gap - history[1, unit, i]
             unit_v_pu[unit, i] = max(v_pu + gap - back * moved, 0.0)
             history[0, unit, i] = v_pu
             history[1, unit, i] = gap
     return change
+
+
+@compiled
+def positive(v: Vector) -> complex:
+    """Positive-sequence component of three phases."""
+    turn = complex(-0.5, 0.75**0.5)
+    return (v[0] + turn * v[1] + turn.conjugate() * v[2]) / 3.0
+
+
+@compiled
+def is_linear(tree: Tree, state: State, s: int) -> bool:
+    """Whether nothing in scenario ``s`` depends on the magnitude of a voltage."""
+    linear = state.edge[s] < 0 or state.step_exponent[s] == 2.0
+    for n in range(tree.load_unit.size):
+        linear &= state.exponent[n, s] == 2.0
+    for m in range(tree.machine_unit.size):
+        linear &= state.machine_exponent[m, s] == 2.0 or state.machine_va[m, s] == 0.0
+    return linear
 
 
 @compiled
@@ -335,22 +593,17 @@ def solve_block(
     last = tree.parent.size
     v_node, i_edge, i_below = probes.v_node, probes.i_edge, probes.i_below
     v_out, i_out, stub_out, unit_out = answer.v, answer.i, answer.stub, answer.unit_v_pu
-    exponent, v, stub = state.exponent, work.v, work.stub
-    i_up, i_low = work.i_up, work.i_low
-    unit_v_pu = np.empty((unit_out.shape[0], 3))
-    history = np.zeros((3, unit_out.shape[0], 3))
+    v, stub, i_up, i_low = work.v, work.stub, work.i_up, work.i_low
+    unit_v_pu = np.empty((unit_out.shape[0], 4))
+    history = np.zeros((3, unit_out.shape[0], 4))
     turn = np.exp(-2j * np.pi / 3)
     for s in range(state.emf_pu.size):
-        edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
-        linear = edge < 0 or state.step_exponent[s] == 2.0
-        for n in range(exponent.shape[0]):
-            linear &= exponent[n, s] == 2.0
+        linear = is_linear(tree, state, s)
         emf = complex(state.emf_pu[s] * tree.v_nominal_v, 0.0)
-        store_vector(v, last, (emf, emf * turn, emf * turn.conjugate()))
         store_vector(stub, 0, (0j, 0j, 0j))
         store_vector(stub, 1, (0j, 0j, 0j))
         for unit in range(unit_v_pu.shape[0]):
-            for i in range(3):
+            for i in range(4):
                 unit_v_pu[unit, i] = unit_out[unit, i, s]
         settled = False
         flags = 0
@@ -358,15 +611,23 @@ def solve_block(
         while not settled and passes < most_passes:
             passes += 1
             set_admittances(tree, state, work, s, unit_v_pu, floor_pu)
-            flags = climb(tree, work, edge, share, mask)
-            descend(tree, work, edge, share, mask)
+            flags = climb(tree, state, work, s)
+            store_vector(v, last, (emf, emf * turn, emf * turn.conjugate()))
+            if tree.isolated:
+                flags |= lift_neutral(work)
+            descend(tree, state, work, s)
             change = update_magnitudes(tree, work, unit_v_pu, history, passes == 1)
             settled = linear or change <= tolerance_pu
         answer.flags[s] = flags if settled else flags | NOT_CONVERGED
         answer.passes[s] = passes
-        for i in range(3):
-            for unit in range(unit_v_pu.shape[0]):
+        for m in range(tree.machine_unit.size):
+            unit = tree.machine_unit[m]
+            windings = times(load(work.g, unit), load_vector(v, tree.unit_node[unit]))
+            answer.machine_v1_v[m, s] = positive(plus(windings, load_vector(work.g_j, unit)))
+        for unit in range(unit_v_pu.shape[0]):
+            for i in range(4):
                 unit_out[unit, i, s] = unit_v_pu[unit, i]
+        for i in range(3):
             stub_out[0, i, s] = stub[0, i]
             stub_out[1, i, s] = stub[1, i]
             for n in range(v_node.size):

@@ -16,16 +16,23 @@ __all__ = [
     "Matrix",
     "Vector",
     "add",
+    "column_sums",
     "inverse",
     "load",
     "load_vector",
+    "minus",
+    "outer",
+    "plus",
     "plus_diagonal",
+    "plus_everywhere",
     "product",
     "reciprocal",
+    "row_sums",
     "scaled",
     "store",
     "store_vector",
     "times",
+    "weighted",
 ]
 
 Matrix = tuple[complex, complex, complex, complex, complex, complex, complex, complex, complex]
@@ -109,6 +116,79 @@ def scaled(a: Matrix, factor: float) -> Matrix:
         factor * a[6],
         factor * a[7],
         factor * a[8],
+    )
+
+
+@compiled
+def weighted(a: Matrix, factor: complex) -> Matrix:
+    """``factor * a``."""
+    return (
+        factor * a[0],
+        factor * a[1],
+        factor * a[2],
+        factor * a[3],
+        factor * a[4],
+        factor * a[5],
+        factor * a[6],
+        factor * a[7],
+        factor * a[8],
+    )
+
+
+@compiled
+def outer(u: Vector, v: Vector, factor: complex) -> Matrix:
+    """``factor * u v^T``."""
+    a, b, c = factor * u[0], factor * u[1], factor * u[2]
+    return (
+        a * v[0],
+        a * v[1],
+        a * v[2],
+        b * v[0],
+        b * v[1],
+        b * v[2],
+        c * v[0],
+        c * v[1],
+        c * v[2],
+    )
+
+
+@compiled
+def row_sums(a: Matrix) -> Vector:
+    """``a 1``."""
+    return (a[0] + a[1] + a[2], a[3] + a[4] + a[5], a[6] + a[7] + a[8])
+
+
+@compiled
+def column_sums(a: Matrix) -> Vector:
+    """``1^T a``."""
+    return (a[0] + a[3] + a[6], a[1] + a[4] + a[7], a[2] + a[5] + a[8])
+
+
+@compiled
+def plus(u: Vector, v: Vector) -> Vector:
+    """``u + v``."""
+    return (u[0] + v[0], u[1] + v[1], u[2] + v[2])
+
+
+@compiled
+def minus(u: Vector) -> Vector:
+    """``-u``."""
+    return (-u[0], -u[1], -u[2])
+
+
+@compiled
+def plus_everywhere(a: Matrix, value: complex) -> Matrix:
+    """``a`` with ``value`` added to every entry."""
+    return (
+        a[0] + value,
+        a[1] + value,
+        a[2] + value,
+        a[3] + value,
+        a[4] + value,
+        a[5] + value,
+        a[6] + value,
+        a[7] + value,
+        a[8] + value,
     )
 
 

@@ -9,31 +9,62 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .bank import D_YG, YG_D, YG_YG
+from .bank import D_D, D_YG, Y_D, YG_D, YG_YG
 from .errors import InputError
-from .parts import Feeder, Line, Load, Place, Transformer
+from .machines import Machines, machines_of, power_va
+from .parts import (
+    Capacitor,
+    Der,
+    Feeder,
+    Line,
+    Load,
+    Place,
+    Regulator,
+    Source,
+    Switch,
+    Transformer,
+)
 from .states import Tree
 from .symmetrical import phase_matrix
 
-__all__ = ["CONNECTIONS", "Network", "Piece", "compile_network", "locate"]
+__all__ = [
+    "CONNECTIONS",
+    "Network",
+    "Piece",
+    "assumed_connection",
+    "compile_network",
+    "detached_end",
+    "locate",
+]
 
-CONNECTIONS: dict[str, int] = {"Yg/Yg": YG_YG, "D/Yg": D_YG, "Yg/D": YG_D}
+CONNECTIONS: dict[str, int] = {
+    "Yg/Yg": YG_YG,
+    "D/Yg": D_YG,
+    "Yg/D": YG_D,
+    "Y/D": Y_D,
+    "D/D": D_D,
+}
+
+NO_PHASES: NDArray[np.complex128] = np.zeros((3, 3), np.complex128)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Piece:
-    """A stretch of line between two nodes, or a closed switch (``line`` None)."""
+    """A stretch of line between two nodes, or a closed switch or regulator (``line`` None)."""
 
     line: str | None
-    ends: tuple[str, str]  #: node names, in the line's direction
+    regulator: str | None = None
+    ends: tuple[str, str]  #: node names, in the direction of the line or regulator
     start: float  #: fraction of the line at the first end
     stop: float  #: and at the second
     length_km: float
     z_ohm: NDArray[np.complex128]  #: (3, 3)
+    end_y_s: NDArray[np.complex128]  #: (3, 3) half of the charging
 
     @property
     def key(self) -> tuple[str | None, tuple[str, str]]:
@@ -50,12 +81,18 @@ class Network:
     pieces: tuple[Piece | None, ...]  #: of each edge; None: the source impedance
     upward: NDArray[np.bool_]  #: (edges,) the edge's upper end is the piece's first end
     length_km: NDArray[np.float64]  #: (edges,)
-    units: tuple[str, ...]  #: transformers, then direct loads
+    units: tuple[str, ...]  #: transformers, then loads and DER that have none
     loads: tuple[str, ...]
     connection: NDArray[np.int64]  #: (U,) as in the file
     exponent: NDArray[np.float64]  #: (L,) as in the file
+    machines: Machines
+    regulators: tuple[str, ...]
+    ratio: NDArray[np.float64]  #: (R, 3) lower over upper voltage, as in the file
+    ratio_step: NDArray[np.float64]  #: (R,) what one tap adds to the voltage, lower over upper
+    ratio_upward: NDArray[np.bool_]  #: (R,) the regulator's from-end is the upper one
     equipped: NDArray[np.bool_]  #: (edges,) something is connected below the edge
     emf_pu: float
+    three_wire: bool
 
     @property
     def has_chord(self) -> bool:
@@ -104,25 +141,45 @@ def locate(network: Network, line: str, fraction: float) -> tuple[int, float]:
     return edge, float(along if network.upward[edge] else 1.0 - along)
 
 
-def compile_network(feeder: Feeder, closed: frozenset[str] | None = None) -> Network:
-    """Compile ``feeder`` with the switches named in ``closed`` closed and all others open.
+def assumed_connection(source: Source) -> str:
+    """What an unknown winding connection counts as, until a study draws it."""
+    return "Yg/Yg" if source.wires == 4 else "D/Yg"
 
-    ``closed`` None: as the file says. Raises InputError for a network that the ladder
-    cannot carry: more than one loop, or a loop without impedance at its fork.
+
+def compile_network(
+    feeder: Feeder,
+    closed: frozenset[str] | None = None,
+    opened: frozenset[str] = frozenset(),
+    *,
+    motors: bool = False,
+) -> Network:
+    """Compile ``feeder`` in one state of its switches.
+
+    Parameters
+    ----------
+    feeder : Feeder
+    closed : frozenset of str, optional
+        The switches that are closed, all others being open; by default as the file says.
+    opened : frozenset of str
+        Measuring points whose recloser is open: their lines do not reach the bus there.
+    motors : bool
+        Give every load a motor, and not only those that have one in the file.
+
+    Raises
+    ------
+    InputError
+        For a network that the ladder cannot carry: more than one loop, a loop without
+        impedance at its fork, or a part that nothing feeds.
     """
     if closed is None:
         closed = frozenset(s.name for s in feeder.switches if s.closed)
-    pieces = _pieces(feeder, closed)
+    pieces = _pieces(feeder, closed, opened)
     order, parent_piece, chord = _span(feeder, pieces)
+    _check_fed(feeder, pieces, order)
     index = {name: k for k, name in enumerate(order)}
     count = len(order)
     edge_pieces: list[Piece | None] = [None, *(pieces[parent_piece[n]] for n in order[1:])]
-    parent = np.full(count, -1, np.int64)
-    upward = np.ones(count + 1, np.bool_)
-    for k, piece in enumerate(edge_pieces):
-        if piece is not None:
-            upward[k] = piece.ends[1] == order[k]
-            parent[k] = index[piece.ends[0] if upward[k] else piece.ends[1]]
+    parent, upward = _hang(edge_pieces, order, index)
     in_loop = np.zeros(count, np.bool_)
     fork = tail = -1
     if chord is not None:
@@ -134,24 +191,26 @@ def compile_network(feeder: Feeder, closed: frozenset[str] | None = None) -> Net
             in_loop[k] = True
             k = int(parent[k])
     edge_pieces.append(chord)
-    units, placed, unit_arrays = _units(feeder, index)
+    units = _units(feeder)
+    machines = machines_of(feeder, tuple(unit.name for unit in units), motors)
     load_unit, load_y = _loads(feeder, units)
-    source = feeder.source
-    z = [phase_matrix(source.z0_ohm, source.z1_ohm, source.z2_ohm)]
-    z += [p.z_ohm if p else np.zeros((3, 3), np.complex128) for p in edge_pieces[1:]]
     tree = Tree(
         parent=parent,
-        z_ohm=np.array(z),
+        z_ohm=np.array([_source_z(feeder.source), *_of_pieces(edge_pieces, "z_ohm")]),
+        end_y_s=np.array([NO_PHASES, *_of_pieces(edge_pieces, "end_y_s")]),
+        charged=any(line.c1_nf_per_km or line.c0_nf_per_km for line in feeder.lines),
+        regulator=_regulator_rows(feeder, edge_pieces),
+        isolated=feeder.source.neutral == "isolated",
         in_loop=in_loop,
         fork=fork,
         tail=tail,
-        unit_node=placed,
-        unit_zh_ohm=unit_arrays[0],
-        unit_zl_ohm=unit_arrays[0],
-        unit_y0_s=unit_arrays[1],
+        shunt_s=_capacitor_shunts(feeder, index),
+        unit_node=np.array([index[_node_name(feeder, _place(u))] for u in units], np.int64),
+        **_unit_arrays(feeder, units),
         load_unit=load_unit,
         load_y_s=load_y,
-        v_nominal_v=source.v_phase_v,
+        machine_unit=machines.unit,
+        v_nominal_v=feeder.source.v_phase_v,
     )
     kept = count + 1 if chord is not None else count
     return Network(
@@ -160,13 +219,56 @@ def compile_network(feeder: Feeder, closed: frozenset[str] | None = None) -> Net
         pieces=tuple(edge_pieces[:kept]),
         upward=upward[:kept],
         length_km=np.array([p.length_km if p else 0.0 for p in edge_pieces[:kept]]),
-        units=units,
+        units=tuple(unit.name for unit in units),
         loads=tuple(load.name for load in feeder.loads),
-        connection=_connections(feeder),
+        connection=np.array([_connection(feeder, unit) for unit in units], np.int64),
         exponent=np.array([load.exponent for load in feeder.loads], np.float64),
+        machines=machines,
+        **_regulator_arrays(feeder, edge_pieces, upward),
         equipped=_equipped(tree)[:kept],
-        emf_pu=source.emf_pu,
+        emf_pu=feeder.source.emf_pu,
+        three_wire=feeder.source.wires == 3,
     )
+
+
+def _source_z(source: Source) -> NDArray[np.complex128]:
+    return phase_matrix(source.z0_ohm + 3.0 * source.neutral_ohm, source.z1_ohm, source.z2_ohm)
+
+
+def _hang(
+    edge_pieces: list[Piece | None], order: list[str], index: dict[str, int]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Each node's parent, and whether its piece leads downwards; one place more for a chord."""
+    parent = np.full(len(order), -1, np.int64)
+    upward = np.ones(len(order) + 1, np.bool_)
+    for k, piece in enumerate(edge_pieces):
+        if piece is not None:
+            upward[k] = piece.ends[1] == order[k]
+            parent[k] = index[piece.ends[0] if upward[k] else piece.ends[1]]
+    return parent, upward
+
+
+def _of_pieces(pieces: list[Piece | None], name: str) -> list[NDArray[np.complex128]]:
+    """A matrix of every edge but the source's; zero where there is no chord."""
+    return [NO_PHASES if piece is None else getattr(piece, name) for piece in pieces[1:]]
+
+
+def _check_fed(feeder: Feeder, pieces: list[Piece], order: list[str]) -> None:
+    """Every bus hangs on the source, one way or another."""
+    apart = {end for piece in pieces for end in piece.ends} - set(order)
+    if apart:
+        names = ", ".join(repr(name) for name in sorted(apart))
+        raise InputError.single(
+            feeder.name,
+            "network",
+            names if len(names) < 60 else f"{len(apart)} buses apart",
+            f"must be connected with '{feeder.source.bus}' in every state of the switches",
+        )
+
+
+def detached_end(point: str) -> str:
+    """Name of the line end behind a measuring point's open recloser."""
+    return f"{point}:open"
 
 
 def _tee(line: str, fraction: float) -> str:
@@ -187,38 +289,58 @@ def _node_name(feeder: Feeder, place: Place) -> str:
     return _tee(place.line, place.at)
 
 
+def _place(part: Transformer | Load | Der | Capacitor) -> Place:
+    assert part.place is not None
+    return part.place
+
+
 def _places(feeder: Feeder) -> list[Place]:
-    own = [load.place for load in feeder.loads if load.place is not None]
+    loose: list[Load | Der | Capacitor] = [*feeder.loads, *feeder.ders, *feeder.capacitors]
+    own = [part.place for part in loose if part.place is not None]
     return [t.place for t in feeder.transformers] + own
 
 
-def _pieces(feeder: Feeder, closed: frozenset[str]) -> list[Piece]:
+def _pieces(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) -> list[Piece]:
     cuts: dict[str, set[float]] = defaultdict(set)
     for place in _places(feeder):
         if place.line is not None and place.at is not None:
             cuts[place.line].add(place.at)
-    pieces = [p for line in feeder.lines for p in _cut(line, cuts[line.name])]
-    for switch in feeder.switches:
-        if switch.name in closed:
-            pieces.append(
-                Piece(
-                    line=None,
-                    ends=(switch.from_bus, switch.to_bus),
-                    start=0.0,
-                    stop=1.0,
-                    length_km=0.0,
-                    z_ohm=np.zeros((3, 3), np.complex128),
-                )
+    omega = 2.0 * np.pi * feeder.source.frequency_hz
+    pieces = []
+    for line in feeder.lines:
+        own = [p for p in feeder.points if p.line == line.name and p.name in opened]
+        detached = {point.bus: point.name for point in own}
+        pieces += _cut(line, cuts[line.name], detached, omega)
+    joining: list[Regulator | Switch] = [s for s in feeder.switches if s.name in closed]
+    for part in [*joining, *feeder.regulators]:
+        pieces.append(
+            Piece(
+                line=None,
+                regulator=part.name if isinstance(part, Regulator) else None,
+                ends=(part.from_bus, part.to_bus),
+                start=0.0,
+                stop=1.0,
+                length_km=0.0,
+                z_ohm=NO_PHASES,
+                end_y_s=NO_PHASES,
             )
+        )
     return pieces
 
 
-def _cut(line: Line, at: set[float]) -> list[Piece]:
+def _cut(line: Line, at: set[float], detached: dict[str, str], omega: float) -> list[Piece]:
+    """The line between its tees; ``detached``: ends that an open recloser keeps from the bus."""
     fractions = sorted({0.0, 1.0, *at})
-    names = [line.from_bus, *(_tee(line.name, x) for x in fractions[1:-1]), line.to_bus]
+    ends = [
+        detached_end(detached[bus]) if bus in detached else bus
+        for bus in (line.from_bus, line.to_bus)
+    ]
+    names = [ends[0], *(_tee(line.name, x) for x in fractions[1:-1]), ends[1]]
     whole = line.length_km * phase_matrix(
         line.z0_ohm_per_km, line.z1_ohm_per_km, line.z1_ohm_per_km
     )
+    siemens = 0.5j * omega * line.length_km * 1e-9
+    half = siemens * phase_matrix(line.c0_nf_per_km, line.c1_nf_per_km, line.c1_nf_per_km)
     return [
         Piece(
             line=line.name,
@@ -227,6 +349,7 @@ def _cut(line: Line, at: set[float]) -> list[Piece]:
             stop=fractions[n + 1],
             length_km=line.length_km * (fractions[n + 1] - fractions[n]),
             z_ohm=whole * (fractions[n + 1] - fractions[n]),
+            end_y_s=half * (fractions[n + 1] - fractions[n]),
         )
         for n in range(len(names) - 1)
     ]
@@ -299,59 +422,89 @@ def _walk(
     return order, parent_piece, left
 
 
-def _units(
-    feeder: Feeder, index: dict[str, int]
-) -> tuple[
-    tuple[str, ...],
-    NDArray[np.int64],
-    tuple[NDArray[np.complex128], NDArray[np.complex128]],
-]:
-    """Unit names, their nodes, and (half leakage, zero-sequence shunt) referred to HV."""
+_Unit = Transformer | Load | Der
+
+
+def _units(feeder: Feeder) -> list[_Unit]:
+    """Everything that hangs on a node as a bank: transformers, and what has none."""
+    loads = [load for load in feeder.loads if load.transformer is None]
+    ders = [der for der in feeder.ders if der.transformer is None]
+    return [*feeder.transformers, *loads, *ders]
+
+
+def _unit_arrays(feeder: Feeder, units: list[_Unit]) -> dict[str, NDArray[np.complex128]]:
+    """Half leakage and magnetizing admittances of the units, referred to HV."""
     kv = feeder.source.kv_ll
-    hosts: list[Transformer | Load] = [*feeder.transformers]
-    hosts += [load for load in feeder.loads if load.transformer is None]
-    node, half, y0 = [], [], []
-    for host in hosts:
-        assert host.place is not None
-        node.append(index[_node_name(feeder, host.place)])
-        if isinstance(host, Load):
-            half.append(0j)
-            y0.append(0j)
-            continue
-        base_ohm = kv * kv / (host.rating_kva / 1000.0)
-        half.append(host.leakage_pu * base_ohm / 2.0)
-        y0.append(0j if host.x0_pu is None else 1.0 / (1j * host.x0_pu * base_ohm))
-    return (
-        tuple(host.name for host in hosts),
-        np.array(node, np.int64),
-        (np.array(half, np.complex128), np.array(y0, np.complex128)),
-    )
+    half, y0, ym = [], [], []
+    for unit in units:
+        leakage, x0, xm, base_ohm = 0j, None, None, 1.0
+        if isinstance(unit, Transformer):
+            leakage, x0, xm = unit.leakage_pu, unit.x0_pu, unit.xm_pu
+            base_ohm = kv * kv / (unit.rating_kva / 1000.0)
+        half.append(leakage * base_ohm / 2.0)
+        y0.append(0j if x0 is None else 1.0 / (1j * x0 * base_ohm))
+        ym.append(0j if xm is None else 1.0 / (1j * xm * base_ohm))
+    z = np.array(half, np.complex128)
+    return {
+        "unit_zh_ohm": z,
+        "unit_zl_ohm": z,
+        "unit_y0_s": np.array(y0, np.complex128),
+        "unit_ym_s": np.array(ym, np.complex128),
+    }
 
 
-def _loads(
-    feeder: Feeder, units: tuple[str, ...]
-) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
+def _connection(feeder: Feeder, unit: _Unit) -> int:
+    """Winding connection; what hangs on the feeder directly is a bank without leakage."""
+    if isinstance(unit, Transformer):
+        known = unit.connection != "unknown"
+        return CONNECTIONS[unit.connection if known else assumed_connection(feeder.source)]
+    return D_YG if isinstance(unit, Load) and unit.connection == "delta" else YG_YG
+
+
+def _loads(feeder: Feeder, units: list[_Unit]) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
     """The unit of every load, and its admittance per winding at nominal voltage."""
+    row = {id(unit): n for n, unit in enumerate(units)}
+    by_name = {unit.name: n for n, unit in enumerate(units) if isinstance(unit, Transformer)}
     unit, y = [], []
     for load in feeder.loads:
-        # a direct load's unit stands behind the transformers, whatever the names are
-        own = units.index(load.name, len(feeder.transformers)) if load.transformer is None else -1
-        unit.append(own if own >= 0 else units.index(str(load.transformer)))
-        p = load.kw * 1000.0 / 3.0
-        q = p * np.sqrt(1.0 / load.power_factor**2 - 1.0) * np.sign(load.power_factor)
-        y.append(complex(p, -q) / feeder.source.v_phase_v**2)
+        unit.append(row[id(load)] if load.transformer is None else by_name[load.transformer])
+        va = power_va(load.kw, load.power_factor)
+        y.append(va.conjugate() / 3.0 / feeder.source.v_phase_v**2)
     return np.array(unit, np.int64), np.array(y, np.complex128)
 
 
-def _connections(feeder: Feeder) -> NDArray[np.int64]:
-    """Winding connections of the units; a direct load is a bank without leakage."""
-    own = [CONNECTIONS[unit.connection] for unit in feeder.transformers]
-    own += [
-        YG_YG if load.connection == "wye" else D_YG
-        for load in feeder.loads
-        if load.transformer is None
-    ]
-    return np.array(own, np.int64)
+def _capacitor_shunts(feeder: Feeder, index: dict[str, int]) -> NDArray[np.complex128]:
+    shunt = np.zeros((len(index), 3, 3), np.complex128)
+    for bank in feeder.capacitors:
+        y = 1j * bank.kvar * 1000.0 / 3.0 / feeder.source.v_phase_v**2
+        y0 = y if bank.connection == "wye" else 0j
+        shunt[index[_node_name(feeder, bank.place)]] += phase_matrix(y0, y, y)
+    return shunt
+
+
+def _regulator_rows(feeder: Feeder, pieces: list[Piece | None]) -> NDArray[np.int64]:
+    names = [regulator.name for regulator in feeder.regulators]
+    rows = [names.index(p.regulator) if p and p.regulator else -1 for p in pieces]
+    return np.array(rows, np.int64)
+
+
+def _regulator_arrays(
+    feeder: Feeder, pieces: list[Piece | None], upward: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """Ratios, lower over upper voltage: inverted where a regulator is fed from its to-end."""
+    ratio, step, ways = [], [], []
+    for regulator in feeder.regulators:
+        edge = next(k for k, p in enumerate(pieces) if p and p.regulator == regulator.name)
+        taps = 1.0 + np.array(regulator.taps) * regulator.step_pct / 100.0
+        ways.append(bool(upward[edge]))
+        ratio.append(taps if upward[edge] else 1.0 / taps)
+        step.append(regulator.step_pct / 100.0)
+    return {
+        "regulators": tuple(regulator.name for regulator in feeder.regulators),
+        "ratio": np.array(ratio, np.float64).reshape(-1, 3),
+        "ratio_step": np.array(step, np.float64),
+        "ratio_upward": np.array(ways, np.bool_),
+    }
 
 
 def _equipped(tree: Tree) -> NDArray[np.bool_]:

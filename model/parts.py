@@ -28,12 +28,14 @@ __all__ = [
     "Source",
     "Switch",
     "Transformer",
+    "VoltageSide",
 ]
 
 Connection = Literal["Yg/Yg", "D/Yg", "Yg/D", "Y/D", "D/D", "unknown"]
 LoadConnection = Literal["wye", "delta"]
 CapacitorConnection = Literal["wye", "delta"]
 DerModel = Literal["thevenin", "constant_current", "constant_power", "generator"]
+VoltageSide = Literal["line", "bus"]
 Neutral = Literal["solid", "resistor", "petersen", "isolated"]
 
 
@@ -190,16 +192,16 @@ class Switch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:
-    """A measuring point: V at ``bus`` and I into ``line`` there, three phases.
+    """A measuring point: a recloser between ``bus`` and that end of ``line``.
 
-    Where it stands at a switch, ``switch`` names it, and ``bus`` is the side of it on which
-    the voltage is measured: the line's own end, or the bus beyond the switch.
+    It measures the current into ``line``, and the voltage on one side of its contacts, which
+    matters while they are open.
     """
 
     name: str
     bus: str
     line: str
-    switch: str | None = None
+    voltage_side: VoltageSide = "line"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .network import Network, Piece, compile_network
+from .network import Network, Piece, compile_network, detached_end
 from .parts import Feeder, Point, Section
 from .states import Probes
-from .topology import edges, forest, tree_path
+from .topology import Tree, edges, forest, tree_path
 
-__all__ = ["Points", "Terminal", "find_points", "into_line", "point_probes"]
+__all__ = ["Points", "Terminal", "Where", "find_points", "into_line", "point_probes"]
+
+
+class Where(IntEnum):
+    """How an edge lies to a section, in the feeder's normal state."""
+
+    PATH = 0  #: between the two points
+    LATERAL = 1  #: on a lateral that tees off that path
+    UPSTREAM = 2  #: on the way to it, or on what else hangs there
+    DOWNSTREAM = 3  #: fed through it
+    OTHER = 4  #: on another branch from the source bus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,8 +41,10 @@ class Terminal:
     into: float  #: +1 where the local current, positive into its line, flows into the section
     on_path: NDArray[np.bool_]  #: edges of the section's path: a break there is internal
     in_section: NDArray[np.bool_]  #: the path, and laterals that tee off it before the next point
-    load_side: bool  #: with the section cut, no path to the source is left behind the terminal
+    load_side: bool  #: with the section cut, nothing behind the terminal could feed it
     line_z1_ohm: complex
+    loop_z1_ohm: complex | None  #: of the whole closed loop that the path is part of; None: none
+    where: NDArray[np.int8]  #: (edges,) a Where: how an edge outside lies to the section
 
     @property
     def name(self) -> str:
@@ -60,35 +73,43 @@ def into_line(points: Points) -> NDArray[np.float64]:
     return np.where(points.below, -1.0, 1.0)
 
 
-def find_points(feeder: Feeder, network: Network) -> Points:
-    """Place the feeder's points and sections in ``network``.
+def find_points(feeder: Feeder, network: Network, opened: frozenset[str] = frozenset()) -> Points:
+    """Place the feeder's points and sections in ``network``, compiled with ``opened``.
 
     Raises InputError for a section that the source feeds from between its points: neither
     terminal would measure what enters it.
     """
-    ends = [_end(network, p) for p in feeder.points]
+    ends = [_end(feeder, network, p) for p in feeder.points]
     terminals = []
     for section in feeder.sections:
-        terminals += _terminals(feeder, network, section)
+        terminals += _terminals(feeder, network, section, opened)
     return Points(
         names=tuple(p.name for p in feeder.points),
-        node=np.array([network.node(p.bus) for p in feeder.points], np.int64),
+        node=np.array([network.node(_voltage_node(p, opened)) for p in feeder.points], np.int64),
         edge=np.array([edge for edge, _ in ends], np.int64),
         below=np.array([below for _, below in ends], np.bool_),
         terminals=tuple(terminals),
     )
 
 
-def _end(network: Network, point: Point) -> tuple[int, bool]:
+def _voltage_node(point: Point, opened: frozenset[str]) -> str:
+    """Where the voltage is measured: beyond the open contacts, if on the line's side."""
+    beyond = point.name in opened and point.voltage_side == "line"
+    return detached_end(point.name) if beyond else point.bus
+
+
+def _end(feeder: Feeder, network: Network, point: Point) -> tuple[int, bool]:
     """The edge at the point's end of its line, and whether the point is at its lower end."""
     pieces = network.edges_of(point.line)
-    first = network.pieces[pieces[0]]
-    at_from = first is not None and first.ends[0] == point.bus
+    line = next(item for item in feeder.lines if item.name == point.line)
+    at_from = line.from_bus == point.bus
     edge = pieces[0] if at_from else pieces[-1]
     return edge, bool(network.upward[edge] != at_from)
 
 
-def _terminals(feeder: Feeder, network: Network, section: Section) -> list[Terminal]:
+def _terminals(
+    feeder: Feeder, network: Network, section: Section, opened: frozenset[str]
+) -> list[Terminal]:
     """Both terminals of a section."""
     points = {p.name: n for n, p in enumerate(feeder.points)}
     ends = [feeder.points[points[name]] for name in (section.local, section.remote)]
@@ -99,6 +120,9 @@ def _terminals(feeder: Feeder, network: Network, section: Section) -> list[Termi
     on_path = _edges_of_lines(network, lines)
     in_section = on_path | _laterals(feeder, network, lines, ends)
     z1 = sum((li.z1_ohm_per_km * li.length_km for li in feeder.lines if li.name in lines), start=0j)
+    where = _where(feeder, network, tree, on_path, in_section)
+    in_loop = np.append(network.tree.in_loop, network.has_chord)[: on_path.size]
+    loop_z1 = _loop_z1(feeder, network, in_loop) if bool(in_loop[on_path].all()) else None
     return [
         Terminal(
             local=here.name,
@@ -108,11 +132,60 @@ def _terminals(feeder: Feeder, network: Network, section: Section) -> list[Termi
             into=1.0 if here.line in lines else -1.0,
             on_path=on_path,
             in_section=in_section,
-            load_side=not _reaches_source(network, network.node(here.bus), in_section),
+            load_side=here.name in opened
+            or not _reaches_feed(feeder, network, network.node(here.bus), in_section),
             line_z1_ohm=z1,
+            loop_z1_ohm=loop_z1,
+            where=where,
         )
         for here, there in (ends, ends[::-1])
     ]
+
+
+def _loop_z1(feeder: Feeder, network: Network, in_loop: NDArray[np.bool_]) -> complex:
+    """Positive-sequence impedance of all line in the closed loop."""
+    lines = {line.name: line for line in feeder.lines}
+    total = 0j
+    for k in np.flatnonzero(in_loop):
+        piece = network.pieces[k]
+        if piece is not None and piece.line is not None:
+            total += piece.length_km * lines[piece.line].z1_ohm_per_km
+    return total
+
+
+def _where(
+    feeder: Feeder,
+    network: Network,
+    tree: Tree,
+    on_path: NDArray[np.bool_],
+    in_section: NDArray[np.bool_],
+) -> NDArray[np.int8]:
+    """A Where for every edge, by the ways to the source in the normal state ``tree``."""
+    ways = {bus: _way(tree, bus) for bus in tree}
+    ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
+    inside = {p.line for k, p in enumerate(network.pieces) if p and on_path[k]}
+    nearest = min((ways[ends[line][0]] for line in inside if line), key=len, default=[])
+    branch = [name for name in nearest if name not in inside][:1]
+    found = np.full(on_path.size, Where.UPSTREAM, np.int8)
+    for k, piece in enumerate(network.pieces):
+        if on_path[k]:
+            found[k] = Where.PATH
+        elif in_section[k]:
+            found[k] = Where.LATERAL
+        elif piece is not None and piece.line is not None:
+            # the way through a line is that of its farther end
+            way = max((ways[bus] for bus in ends[piece.line]), key=len)
+            if inside & set(way):
+                found[k] = Where.DOWNSTREAM
+            elif way[:1] != branch:
+                found[k] = Where.OTHER
+    return found
+
+
+def _way(tree: Tree, bus: str) -> list[str]:
+    """Lines from the source to a bus."""
+    _, taken = tree_path(tree, next(iter(tree)), bus)
+    return [edge.name for edge in taken if edge.is_line]
 
 
 def _edges_of_lines(network: Network, lines: set[str]) -> NDArray[np.bool_]:
@@ -161,14 +234,20 @@ def _grow(
     return found, reached
 
 
-def _reaches_source(network: Network, node: int, cut: NDArray[np.bool_]) -> bool:
-    """Whether ``node`` is joined to the source bus without the edges in ``cut``."""
+def _reaches_feed(feeder: Feeder, network: Network, node: int, cut: NDArray[np.bool_]) -> bool:
+    """Whether ``node`` is joined to the source, or to a DER with an EMF, without ``cut``."""
+    units = [
+        network.tree.machine_unit[len(network.machines.motor_load) + n]
+        for n, der in enumerate(feeder.ders)
+        if der.model in ("thevenin", "generator")
+    ]
+    feeds = {0, *(int(network.tree.unit_node[unit]) for unit in units)}
     joined: list[tuple[int, int]] = [
         (int(network.tree.parent[k]), k) for k in range(1, len(network.nodes)) if not cut[k]
     ]
     if network.has_chord and not cut[len(network.nodes)]:
         joined.append((network.tree.fork, network.tree.tail))
-    reached = {0}
+    reached = feeds
     grown = True
     while grown:
         grown = False

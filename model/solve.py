@@ -5,16 +5,19 @@ States and answers are structures of arrays with the scenario axis last.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .ladder import solve_block
+from .machines import FLOOR_PU, machine_state
 from .network import Network
 from .states import Answer, Probes, State, workspace
 
-__all__ = ["FLOOR_PU", "all_probes", "new_answer", "solve", "steady_state"]
+__all__ = ["FLOOR_PU", "all_probes", "new_answer", "quiet_state", "solve", "steady_state"]
 
-FLOOR_PU = 0.7  #: below it a load is constant impedance, at its admittance there
 TOLERANCE_PU = 1e-12  #: largest change of a winding voltage in the last pass
 MOST_PASSES = 200
 
@@ -31,17 +34,41 @@ def all_probes(network: Network) -> Probes:
 
 def steady_state(network: Network, scenarios: int = 1) -> State:
     """The file's own loads, connections and EMF, without any event."""
-    loads = len(network.loads)
+    return quiet_state(
+        network,
+        np.ones((len(network.loads), scenarios)),
+        np.repeat(network.exponent[:, None], scenarios, axis=1),
+    )
+
+
+def quiet_state(
+    network: Network,
+    load_scale: NDArray[np.float64],
+    exponent: NDArray[np.float64],
+    machines: Mapping[str, Any] | None = None,
+) -> State:
+    """A state without event at the file's EMF, ratios and connections.
+
+    ``load_scale`` and ``exponent`` are (L, S); ``machines`` are the fields that
+    ``machine_state`` makes, by default at the file's own shares and levels.
+    """
+    scenarios = load_scale.shape[1]
+    nothing = np.zeros((3, scenarios), np.complex128)
+    fields = machine_state(network, load_scale, exponent) if machines is None else machines
     return State(
         emf_pu=np.full(scenarios, network.emf_pu),
-        load_scale=np.ones((loads, scenarios)),
-        exponent=np.repeat(network.exponent[:, None], scenarios, axis=1),
+        **fields,
         connection=np.repeat(network.connection[:, None], scenarios, axis=1),
+        ratio=np.repeat(network.ratio[:, :, None], scenarios, axis=2),
         edge=np.full(scenarios, -1, np.int64),
         share=np.zeros(scenarios),
         open_mask=np.zeros(scenarios, np.int64),
-        step_y_s=np.zeros((3, scenarios), np.complex128),
+        step_y_s=nothing,
         step_exponent=np.full(scenarios, 2.0),
+        between_y_s=nothing,
+        fallen_y_s=nothing,
+        far_node=np.full(scenarios, -1, np.int64),
+        far_y_s=nothing,
     )
 
 
@@ -51,7 +78,8 @@ def new_answer(network: Network, probes: Probes, scenarios: int) -> Answer:
         v=np.empty((probes.v_node.size, 3, scenarios), np.complex128),
         i=np.empty((probes.i_edge.size, 3, scenarios), np.complex128),
         stub=np.empty((2, 3, scenarios), np.complex128),
-        unit_v_pu=np.ones((len(network.units) + 1, 3, scenarios)),
+        unit_v_pu=np.ones((len(network.units) + 1, 4, scenarios)),
+        machine_v1_v=np.zeros((network.machines.count, scenarios), np.complex128),
         flags=np.zeros(scenarios, np.int64),
         passes=np.zeros(scenarios, np.int64),
     )
@@ -71,10 +99,10 @@ def solve(
     ----------
     network : Network
     state : State
-        S scenarios. An event is one thing: opened phases or a load step, not both.
+        S scenarios.
     probes : Probes, optional
         Where to look; by default everywhere.
-    start : (U + 1, 3, S) array, optional
+    start : (U + 1, 4, S) array, optional
         Winding voltages in pu from which the loads' fixed point starts, such as
         ``unit_v_pu`` of the state before the event; by default nominal.
     tolerance_pu : float
@@ -88,12 +116,12 @@ def solve(
     Raises
     ------
     ValueError
-        Shapes that do not fit, a place outside an edge, or two events in one scenario.
+        Shapes that do not fit, or a place outside an edge.
     """
     _check(network, state)
     probes = probes or all_probes(network)
     answer = new_answer(network, probes, state.emf_pu.size)
-    work = workspace(len(network.nodes), len(network.units))
+    work = workspace(network.tree)
     answer.unit_v_pu[:] = 1.0 if start is None else start
     solve_block(network.tree, state, probes, work, answer, tolerance_pu, MOST_PASSES, FLOOR_PU)
     return answer
@@ -101,16 +129,25 @@ def solve(
 
 def _check(network: Network, state: State) -> None:
     s = state.emf_pu.size
-    loads, units = len(network.loads), len(network.units)
+    loads, units, machines = len(network.loads), len(network.units), network.machines.count
     wanted = {
         "load_scale": (loads, s),
         "exponent": (loads, s),
         "connection": (units, s),
+        "ratio": (len(network.regulators), 3, s),
+        "machine_va": (machines, s),
+        "machine_exponent": (machines, s),
+        "machine_y_s": (machines, 3, s),
+        "machine_j_a": (machines, s),
         "edge": (s,),
         "share": (s,),
         "open_mask": (s,),
         "step_y_s": (3, s),
         "step_exponent": (s,),
+        "between_y_s": (3, s),
+        "fallen_y_s": (3, s),
+        "far_node": (s,),
+        "far_y_s": (3, s),
     }
     for name, shape in wanted.items():
         found = getattr(state, name).shape
@@ -119,8 +156,12 @@ def _check(network: Network, state: State) -> None:
     edge = state.edge
     if np.any((edge == 0) | (edge < -1) | (edge >= len(network.pieces))):
         raise ValueError("state.edge must be -1 or the index of a line's edge")
+    on_line = network.length_km[edge] > 0
+    if np.any((edge > 0) & ~on_line):
+        raise ValueError("state.edge must be a line's edge, not a switch or regulator")
     if np.any((state.share < 0) | (state.share > 1)):
         raise ValueError("state.share must lie in 0..1")
-    opened = state.open_mask != 0
-    if np.any(opened & (edge < 0)) or np.any(opened & (state.step_y_s != 0).any(axis=0)):
-        raise ValueError("a scenario opens phases on an edge, or switches a load there, not both")
+    if np.any((state.far_node < -1) | (state.far_node >= len(network.nodes))):
+        raise ValueError("state.far_node must be -1 or the index of a node")
+    if np.any((state.open_mask != 0) & (edge < 0)):
+        raise ValueError("a scenario opens phases, but on no edge")

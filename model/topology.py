@@ -1,4 +1,4 @@
-"""The feeder as a graph: buses joined by lines and switches."""
+"""The feeder as a graph: buses joined by lines, switches and regulators."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Edge", "Tree", "buses", "edges", "forest", "tree_path"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edge:
-    """A line or switch as the graph sees it; ``path`` is its key path in the document."""
+    """A line, switch or regulator in the graph; ``path`` is its key path in the document."""
 
     path: KeyPath
     name: str
@@ -31,7 +31,7 @@ Tree = dict[str, tuple[str, Edge] | None]
 
 
 def edges(feeder: Feeder) -> tuple[Edge, ...]:
-    """Return the lines and the normally closed switches, in the feeder's order."""
+    """Return the lines, the normally closed switches and the regulators, in the feeder's order."""
     lines = (
         Edge(path=("lines", index), name=line.name, ends=(line.from_bus, line.to_bus))
         for index, line in enumerate(feeder.lines)
@@ -41,7 +41,11 @@ def edges(feeder: Feeder) -> tuple[Edge, ...]:
         for index, switch in enumerate(feeder.switches)
         if switch.closed
     )
-    return (*lines, *switches)
+    regulators = (
+        Edge(path=("regulators", index), name=part.name, ends=(part.from_bus, part.to_bus))
+        for index, part in enumerate(feeder.regulators)
+    )
+    return (*lines, *switches, *regulators)
 
 
 def buses(feeder: Feeder) -> tuple[str, ...]:

@@ -72,9 +72,7 @@ def places_on(network: Network, chosen: NDArray[np.bool_] | None = None) -> Plac
     return Places(edges=edges, length_km=network.length_km[edges])
 
 
-def draw_place(
-    rng: np.random.Generator, size: int, regions: Sequence[Places]
-) -> tuple[Int, Real]:
+def draw_place(rng: np.random.Generator, size: int, regions: Sequence[Places]) -> tuple[Int, Real]:
     """Edges and shares: every region equally likely, within it uniform in length."""
     region = rng.integers(len(regions), size=size)
     edge = np.empty(size, np.int64)
@@ -105,7 +103,7 @@ def no_event(network: Network, size: int) -> Event:
         emf_factor=np.ones(size),
         tap_factor=np.ones((len(network.regulators), 3, size)),
         load_factor=np.ones((len(network.loads), size)),
-        der_factor=np.ones((len(network.ders), size)),
+        der_factor=np.ones((len(network.machines.ders), size)),
     )
 
 
@@ -116,10 +114,11 @@ def apply_event(network: Network, before: State, after: State, event: Event) -> 
     DER keep from before the event is filled in once that has been solved
     (``machines.carried_over``).
     """
-    ders = slice(len(network.machines) - len(network.ders), None)
-    va = after.machine_va.copy()
-    va[network.motor_row] *= event.load_factor[network.motor_load]
-    va[ders] *= event.der_factor
+    motor_load = network.machines.motor_load
+    motors = slice(0, motor_load.size)
+    va, y = after.machine_va.copy(), after.machine_y_s.copy()
+    va[motors] *= event.load_factor[motor_load]
+    y[motors] *= event.load_factor[motor_load][:, None]
     first = before._replace(
         edge=event.edge,
         share=event.share,
@@ -136,6 +135,7 @@ def apply_event(network: Network, before: State, after: State, event: Event) -> 
         ratio=after.ratio * event.tap_factor,
         load_scale=after.load_scale * event.load_factor,
         machine_va=va,
+        machine_y_s=y,
         edge=event.edge,
         share=event.share,
         open_mask=event.open_after,
