@@ -3,45 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .base import Event, Places, no_event
+from ..distributions import Distribution
+from ..network import Network
+from .base import Event, Places, draw_place, no_event
+from .shunts import each_way, load, phase_shares, put
 
-__all__ = ["draw_load_step"]
+__all__ = ["LoadStepLaw", "draw_load_step"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadStepLaw:
+    """How large a step is, on how many phases, and how it follows the voltage."""
+
+    kw: Distribution  #: at nominal voltage, all phases together
+    single_phase_share: float  #: the rest are balanced
+    exponent: Distribution  #: voltage exponent of the load switched
 
 
 def draw_load_step(
     rng: np.random.Generator,
     size: int,
+    network: Network,
     regions: Sequence[Places],
-    kw: tuple[float, float],
-    single_phase_share: float,
-    exponent: tuple[float, float],
+    law: LoadStepLaw,
 ) -> Event:
-    """A wye-grounded load at unity power factor, on or off with equal probability.
+    """A load at unity power factor, on or off as likely; every region as likely.
 
-    Every region (section) is equally likely; within it the place is uniform in length.
-    Power is uniform in ``kw``, on one phase with probability ``single_phase_share`` and
-    shared by three otherwise; the voltage exponent is its own, uniform in ``exponent``.
+    With a neutral it is grounded wye, on one phase or on three. On three wires it lies between
+    two phases or between all of them, and is constant impedance whatever ``law.exponent``.
     """
-    region = rng.integers(len(regions), size=size)
-    edge = np.empty(size, np.int64)
-    share = np.empty(size)
-    for n, places in enumerate(regions):
-        here = region == n
-        edge[here], share[here] = places.draw(rng, int(here.sum()))
-    watts = rng.uniform(*kw, size) * 1000.0
-    phase = rng.integers(3, size=size)
-    single = rng.random(size) < single_phase_share
-    per_phase = np.where(single, phase == np.arange(3)[:, None], 1.0 / 3.0) * watts
-    on = rng.random(size) < 0.5
-    return replace(
-        no_event(size),
+    edge, share = draw_place(rng, size, regions)
+    watts = law.kw.draw(rng, size) * 1000.0
+    shares = phase_shares(rng, size, law.single_phase_share)
+    before, after = each_way(rng, load(network, (shares * watts).astype(np.complex128)))
+    exponent = law.exponent.draw(rng, size)
+    event = replace(
+        no_event(network, size),
         edge=edge,
         share=share,
-        step_before_w=np.where(on, 0.0, per_phase),
-        step_after_w=np.where(on, per_phase, 0.0),
-        step_exponent=rng.uniform(*exponent, size),
+        exponent=np.full(size, 2.0) if network.three_wire else exponent,
     )
+    return put(event, before, after)

@@ -1,0 +1,55 @@
+"""Nodes and places: which node is nearest to a place, and which place is a node's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..network import Network
+from .base import Places, draw_place
+
+__all__ = ["draw_node", "fed_through", "place_of"]
+
+Int = NDArray[np.int64]
+
+
+def draw_node(
+    rng: np.random.Generator, size: int, network: Network, regions: Sequence[Places]
+) -> Int:
+    """(S,) the nodes nearest to places drawn as for any other event."""
+    edge, share = draw_place(rng, size, regions)
+    tree = network.tree
+    # the chord, the last edge, is no node's own: it leads from the tail to the fork
+    upper = np.append(tree.parent, tree.tail)[edge]
+    lower = np.append(np.arange(tree.parent.size), tree.fork)[edge]
+    return np.where(share < 0.5, upper, lower)
+
+
+def place_of(network: Network, node: Int) -> tuple[Int, NDArray[np.float64]]:
+    """Edges and shares of ``node`` (S,): the lower end of the line that leads to it.
+
+    Closed switches and regulators on the way up have no length and are passed over. Edge -1:
+    no line stands between the node and the source.
+    """
+    edge = node.copy()
+    passed = (edge > 0) & (network.length_km[edge] == 0.0)
+    while passed.any():
+        edge = np.where(passed, network.tree.parent[edge], edge)
+        passed = (edge > 0) & (network.length_km[edge] == 0.0)
+    edge = np.where(edge > 0, edge, -1)
+    return edge, np.where(edge > 0, 1.0, 0.0)
+
+
+def fed_through(network: Network, edge: Int, nodes: Int) -> NDArray[np.bool_]:
+    """(n, S) which of ``nodes`` (n,) have no supply but through the edges (S,).
+
+    An edge of a closed loop is no node's only supply.
+    """
+    tree = network.tree
+    found = np.zeros((nodes.size, edge.size), np.bool_)
+    for k in np.unique(edge[(edge > 0) & (edge < tree.parent.size)]):
+        if not tree.in_loop[k]:
+            found[:, edge == k] = network.below(int(k))[nodes][:, None]
+    return found

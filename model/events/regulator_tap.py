@@ -1,0 +1,53 @@
+"""A voltage regulator changes taps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..distributions import Distribution
+from ..network import Network
+from .along import place_of
+from .base import Event, no_event
+from .shunts import one_of_three
+
+__all__ = ["draw_regulator_tap"]
+
+
+def draw_regulator_tap(
+    rng: np.random.Generator,
+    size: int,
+    network: Network,
+    taps: Distribution,
+    single_phase_share: float,
+) -> Event:
+    """One regulator moves by ``taps``: one phase that often, else all three alike.
+
+    Every regulator is as likely. The event stands at the end of the line that leads to it, or
+    nowhere if none does. Raises ValueError for a network without regulators.
+    """
+    count = len(network.regulators)
+    if count == 0:
+        raise ValueError("regulator taps: the network has 0 regulators, wanted at least 1")
+    which = rng.integers(count, size=size)
+    moves = taps.draw(rng, size)
+    phase = one_of_three(rng, size) | (rng.random(size) >= single_phase_share)
+    moved = phase & (which == np.arange(count)[:, None, None])
+    edges = [np.flatnonzero(network.tree.regulator == r)[0] for r in range(count)]
+    edge, share = place_of(network, network.tree.parent[edges][which])
+    return replace(
+        no_event(network, size),
+        edge=edge,
+        share=share,
+        tap_factor=_ratio_factor(network, moved * moves),
+    )
+
+
+def _ratio_factor(network: Network, moves: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(R, 3, S) new over old ratio, ``moves`` taps on; a tap adds to the to-end's voltage."""
+    upward, step = network.ratio_upward[:, None, None], network.ratio_step[:, None, None]
+    old = network.ratio[:, :, None]
+    boost = np.where(upward, old, 1.0 / old) + moves * step
+    return np.where(upward, boost, 1.0 / boost) / old
