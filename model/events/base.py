@@ -72,9 +72,7 @@ def places_on(network: Network, chosen: NDArray[np.bool_] | None = None) -> Plac
     return Places(edges=edges, length_km=network.length_km[edges])
 
 
-def draw_place(
-    rng: np.random.Generator, size: int, regions: Sequence[Places]
-) -> tuple[Int, Real]:
+def draw_place(rng: np.random.Generator, size: int, regions: Sequence[Places]) -> tuple[Int, Real]:
     """Edges and shares: every region equally likely, within it uniform in length."""
     region = rng.integers(len(regions), size=size)
     edge = np.empty(size, np.int64)
