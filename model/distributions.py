@@ -186,8 +186,9 @@ class Lognormal(Distribution):
     def quantile(self, u: Real) -> Real:
         """Return the inverse of the truncated distribution function."""
         below, above = self._cut()
-        z = ndtri(below + u * (above - below))
-        return _between(self.median * np.exp(self.sigma * z), self.low, self.high)
+        with np.errstate(over="ignore"):  # beyond the ends anyway
+            values = self.median * np.exp(self.sigma * ndtri(below + u * (above - below)))
+        return _between(values, self.low, self.high)
 
     def _cut(self) -> tuple[float, float]:
         """Shares of the uncut distribution below the two ends."""
@@ -251,7 +252,8 @@ class Integers(Distribution):
 
     def quantile(self, u: Real) -> Real:
         """Return the number in whose share of 0..1 ``u`` lies."""
-        return np.minimum(self.least + np.floor(u * (self.most - self.least + 1)), self.most)
+        step = np.floor(u * (self.most - self.least + 1))
+        return _between(self.least + step, self.least, self.most)
 
     @property
     def support(self) -> tuple[float, float]:
@@ -285,8 +287,8 @@ class Values(Distribution):
 
     def quantile(self, u: Real) -> Real:
         """Return the number in whose share of 0..1 ``u`` lies."""
-        numbers: Real = np.asarray(self.values, np.float64)
-        return numbers[_pick(u, self.weights, len(self.values))]
+        numbers = np.asarray(self.values, np.float64)
+        return np.take(numbers, _pick(u, self.weights, len(self.values)))
 
     @property
     def support(self) -> tuple[float, float]:
@@ -343,9 +345,10 @@ def _between(values: Real, low: float, high: float) -> Real:
 def _pick(u: Real, weights: tuple[float, ...], count: int) -> Int:
     """Indices of the weights' shares of 0..1 that hold ``u``; one without weight holds nothing."""
     shares = np.asarray(weights or (1.0,) * count, np.float64)
-    stops = np.cumsum(shares)[np.flatnonzero(shares)]
+    some: Int = np.flatnonzero(shares)
+    stops = np.cumsum(shares[some])
     holds = np.searchsorted(stops / stops[-1], u, side="right")
-    return np.flatnonzero(shares)[np.minimum(holds, stops.size - 1)]
+    return some[np.minimum(holds, some.size - 1)]
 
 
 def _window_fault(low: float, high: float, cut: Callable[[], tuple[float, float]]) -> str | None:
