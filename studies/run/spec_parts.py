@@ -1,38 +1,44 @@
-"""What a study is made of: plain data, and the grids of settings a device can hold.
+"""What a study is made of: plain data.
 
-The defaults are those of a study file in which nothing is said. A ``(low, high)`` pair is
-the range of a uniform draw unless its field says otherwise.
+The defaults are those of a study file in which nothing is said. The events stand in
+`spec_events`, the relay's grids of settings in `spec_device`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from fractions import Fraction
-from itertools import pairwise
+from typing import Literal
 
-from ...model.errors import InputError
+from ...model.distributions import Choices, Distribution, Fixed, Uniform
+from .spec_device import Device
+from .spec_events import Events
 
 __all__ = [
-    "MOST_STEPS",
+    "UNKNOWN_CONNECTION",
     "Ambient",
+    "BothEnds",
     "CertificateDemand",
+    "Correlation",
+    "DerDraw",
     "DetectorOptions",
-    "Device",
+    "Group",
     "Instruments",
     "LoadDraw",
-    "LoadStepDraw",
+    "MotorDraw",
     "NetworkState",
-    "OpenPhaseDraw",
     "ReferenceSettings",
-    "SourceStepDraw",
-    "Steps",
     "Study",
     "TransformerDraw",
 ]
 
-MOST_STEPS = 10_000
-"""The most numbers that `Steps` may hold: beyond it a mistyped step is likelier."""
+GroupSettings = Literal["each", "one"]
+BothEnds = Literal["off", "no_small_z", "agree"]
+
+UNKNOWN_CONNECTION = {
+    4: Choices(values=("Yg/Yg", "D/Yg", "Yg/D"), weights=(0.6, 0.3, 0.1)),
+    3: Choices(values=("D/Yg", "D/D", "Y/D"), weights=(0.8, 0.1, 0.1)),
+}
+"""What a transformer of unknown connection may be, by the feeder's wires: a guess."""
 
 
 # ---- the state of the feeder before the event ----
@@ -51,18 +57,35 @@ class LoadDraw:
     exponent
         Voltage exponent common to all loads, dimensionless.
     exponent_spread
-        How far a load's exponent may lie from the common one; the sum is clipped to 0..2.
+        How far a load's exponent may lie from the common one, uniformly; the sum is clipped
+        to 0..2.
     """
 
-    level: tuple[float, float] = (0.25, 1.0)
-    each: tuple[float, float] = (0.8, 1.2)
-    exponent: tuple[float, float] = (0.0, 2.0)
+    level: Distribution = Uniform(low=0.25, high=1.0)
+    each: Distribution = Uniform(low=0.8, high=1.2)
+    exponent: Distribution = Uniform(low=0.0, high=2.0)
     exponent_spread: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MotorDraw:
+    """How much of the loads are motors, the same for all of them.
+
+    Parameters
+    ----------
+    share
+        Part of each load's P + jQ that motors take; None for the shares in the feeder file.
+    y2_y1
+        Their negative-sequence admittance over their positive-sequence one; None likewise.
+    """
+
+    share: Distribution | None = None
+    y2_y1: Distribution | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TransformerDraw:
-    """How many transformers are Yg/D.
+    """How the transformers are connected.
 
     Parameters
     ----------
@@ -70,11 +93,31 @@ class TransformerDraw:
         Names of the units in question: the first of them are Yg/D, as many as are drawn,
         and the others are what the feeder file says.
     yg_d_count
-        Least and most units drawn, each number between being as likely.
+        How many are Yg/D, a whole number.
+    unknown
+        What each unit is whose connection is unknown, drawn for it by itself; None for
+        `UNKNOWN_CONNECTION`.
     """
 
     yg_d: tuple[str, ...] = ()
-    yg_d_count: tuple[int, int] = (0, 0)
+    yg_d_count: Distribution = Fixed(value=0.0)
+    unknown: Choices | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DerDraw:
+    """How much the DER deliver, and how they answer an event.
+
+    Parameters
+    ----------
+    level
+        Factor common to all DER, on the feeder file's kW.
+    model
+        What each DER is, drawn for it by itself; None for the models in the feeder file.
+    """
+
+    level: Distribution = Uniform(low=0.0, high=1.0)
+    model: Choices | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,64 +138,55 @@ class Ambient:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkState:
-    """Which switches are closed.
+    """Which switches are closed, and whether each state of the network has settings of its own.
 
     Parameters
     ----------
     closed
         The switches that are closed, all others being open; None for the states in the
-        feeder file.
+        feeder file. Of no use where there are groups.
+    settings
+        Whether each group has settings of its own, or one setting serves all.
     """
 
     closed: tuple[str, ...] | None = None
-
-
-# ---- the events ----
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OpenPhaseDraw:
-    """Broken conductors.
-
-    Parameters
-    ----------
-    two_phase_share
-        Share of the breaks that open two phases; the rest open one.
-    """
-
-    two_phase_share: float = 0.2
+    settings: GroupSettings = "each"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LoadStepDraw:
-    """Load switched on or off, somewhere on a line.
+class Group:
+    """A state of the network for which the relay has a setting group.
 
     Parameters
     ----------
-    kw
-        Size at nominal voltage, kW.
-    single_phase_share
-        Share of the steps that are on one phase; the rest are balanced.
-    exponent
-        Voltage exponent of the load switched, dimensionless.
+    name
+        Name of the group.
+    closed
+        The switches that are closed, all others being open; None for the states in the
+        feeder file.
+    opened
+        The measuring points whose recloser is open.
     """
 
-    kw: tuple[float, float] = (10.0, 500.0)
-    single_phase_share: float = 0.5
-    exponent: tuple[float, float] = (0.0, 2.0)
+    name: str
+    closed: tuple[str, ...] | None = None
+    opened: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SourceStepDraw:
-    """A step of the source's voltage.
+class Correlation:
+    """Two quantities of a scenario that go together.
 
     Parameters
     ----------
-    pct
-        Change of the EMF, percent of what it was.
+    between
+        The two, such as ``("loads.level", "ders.level")``: of `spec_correlations.SCALARS`.
+    rank
+        Spearman's rank correlation.
     """
 
-    pct: tuple[float, float] = (-5.0, 5.0)
+    between: tuple[str, str]
+    rank: float
 
 
 # ---- measuring and judging ----
@@ -160,138 +194,75 @@ class SourceStepDraw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Instruments:
-    """Bounds of a measured phasor's random error.
+    """Bounds of what a measured phasor may be wrong by.
 
     Parameters
     ----------
     tve_pct
-        Total vector error, percent of the phasor's magnitude.
+        Random error of each phasor: total vector error, percent of its magnitude.
     current_floor_a
-        Error that a current may have however small it is, A.
+        Random error that a current may have however small it is, A.
+    ratio_pct
+        Error of magnitude, percent, constant within a scenario; per phase and channel.
+    angle_mrad
+        Error of angle, mrad, likewise.
+    clock_us
+        Offset of each measuring point's clock, microseconds, constant within a scenario.
+    frequency_hz
+        Error of the frequency that all phasors are referred to, Hz.
     """
 
     tve_pct: float = 0.05
     current_floor_a: float = 0.05
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Steps:
-    """Numbers in even steps, both ends among them.
-
-    Examples
-    --------
-    >>> Steps(first=0.1, last=0.4, step=0.1).values()
-    (0.1, 0.2, 0.3, 0.4)
-    """
-
-    first: float
-    last: float
-    step: float
-
-    def values(self) -> tuple[float, ...]:
-        """Return the numbers, each the float nearest to its decimal.
-
-        Adding up floats would miss: three steps of 0.1 are 0.30000000000000004, which is
-        not the 0.3 that a relay is set to.
-
-        Raises
-        ------
-        InputError
-            If the steps do not lead from first to last, or are more than `MOST_STEPS`.
-        """
-        first, last, step = (Fraction(str(x)) for x in (self.first, self.last, self.step))
-        if step <= 0 or last < first:
-            raise _unfit("must have a step > 0 and last >= first")
-        count = (last - first) / step
-        if count.denominator != 1:
-            raise _unfit("must reach last from first in whole steps")
-        if count >= MOST_STEPS:
-            raise _unfit(f"must hold at most {MOST_STEPS} numbers")
-        return tuple(float(first + k * step) for k in range(int(count) + 1))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Device:
-    """The settings that a relay can hold: guesses, until its manual is at hand.
-
-    Parameters
-    ----------
-    i_set_a
-        Current threshold of eq. (22), primary A.
-    z_set_ohm
-        Impedance threshold of eq. (24), primary ohm: ranges, one above the other.
-    v_set_pct
-        Voltage threshold of eq. (23), percent of the nominal phase voltage, rising.
-    ct_primary_a
-        Primary current that is 1 pu to the relay, A. The 100 A is a guess, with which the
-        0.01 pu in the paper's Table I is the 1 A it is said to be.
-    """
-
-    i_set_a: Steps = Steps(first=0.1, last=10.0, step=0.1)
-    z_set_ohm: tuple[Steps, ...] = (
-        Steps(first=0.1, last=50.0, step=0.1),
-        Steps(first=51.0, last=300.0, step=1.0),
-    )
-    v_set_pct: tuple[float, ...] = (0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0)
-    ct_primary_a: float = 100.0
-
-    def i_grid(self) -> tuple[float, ...]:
-        """Return the values of I_set in rising order, primary A.
-
-        Raises
-        ------
-        InputError
-            If there are none, or they do not rise; likewise from the other grids.
-        """
-        return _rising(self.i_set_a.values())
-
-    def z_grid(self) -> tuple[float, ...]:
-        """Return the values of Z_set in rising order, primary ohm."""
-        return _rising(value for steps in self.z_set_ohm for value in steps.values())
-
-    def v_grid_pu(self) -> tuple[float, ...]:
-        """Return the values of V_set in rising order, pu of the nominal phase voltage.
-
-        Examples
-        --------
-        >>> Device(v_set_pct=(0.7, 7.0)).v_grid_pu()
-        (0.007, 0.07)
-        """
-        return _rising(float(Fraction(str(pct)) / 100) for pct in self.v_set_pct)
-
-
-def _rising(numbers: Iterable[float]) -> tuple[float, ...]:
-    """Return the numbers; raise if there are none or if one is not above that before it."""
-    values = tuple(numbers)
-    if not values:
-        raise _unfit("must hold at least one number")
-    if any(after <= before for before, after in pairwise(values)):
-        raise _unfit("must hold numbers that rise")
-    return values
-
-
-def _unfit(rule: str) -> InputError:
-    return InputError.single("", "a grid of settings", None, rule)
+    ratio_pct: float = 0.3
+    angle_mrad: float = 5.0
+    clock_us: float = 1.0
+    frequency_hz: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorOptions:
-    """Options of the detector that are the same everywhere.
+    """Options of the detector that are the same everywhere; see `detector.criteria.Options`.
 
     Parameters
     ----------
     dt_ms
         Distance between the two frames that a change is taken from, ms.
     delay_ms
-        How long the criteria must hold before the trip, ms. Like `dt_ms` it is carried
-        into the results, and not judged yet.
+        How long the criteria must hold before the trip, ms. It is carried into the results,
+        and not judged yet.
     negative_sign
         Trip only if the real part of the connection impedance is negative.
+    fallback
+        Judge each phase by itself where the positive sequence changes too little.
+    compensated
+        Demand that the part of the current's change that the local voltage does not explain
+        reach I_set too.
+    any_sequence
+        Let the largest change of the three sequences reach I_set.
+    floor_v
+        Least compensated change of the remote voltage with `any_sequence`, V.
+    waive_sign_below_a
+        With `any_sequence`, the sign is not asked for below this compensated change, A.
+    unbalance
+        Least change of the other sequences, in changes of the positive; 0 asks for none.
+    direction
+        Trip only on what opens, not on what closes.
+    both_ends
+        What the far end must say: nothing, no small impedance, or the same.
     """
 
     dt_ms: float = 800.0
     delay_ms: float = 300.0
     negative_sign: bool = True
+    fallback: bool = True
+    compensated: bool = False
+    any_sequence: bool = False
+    floor_v: float = 25.0
+    waive_sign_below_a: float = 0.3
+    unbalance: float = 0.0
+    direction: bool = False
+    both_ends: BothEnds = "off"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -327,12 +298,16 @@ class CertificateDemand:
         The least dependability, as a share of the breaks; below it settings are weak.
     margin
         The least factor to the nearest false trip.
+    loop_margins
+        In a closed loop Z_set must be at least the first factor times the section's
+        impedance, and at most what the rest of the loop has, over the second factor.
     """
 
     confidence: float = 0.95
     target: float = 1e-4
     find_at_least: float = 0.5
     margin: float = 1.25
+    loop_margins: tuple[float, float] = (2.0, 1.25)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -343,14 +318,26 @@ class Study:
     """
 
     loads: LoadDraw = LoadDraw()
+    motors: MotorDraw = MotorDraw()
     transformers: TransformerDraw = TransformerDraw()
+    ders: DerDraw = DerDraw()
     ambient: Ambient = Ambient()
+    correlations: tuple[Correlation, ...] = ()
     network: NetworkState = NetworkState()
-    open_phase: OpenPhaseDraw = OpenPhaseDraw()
-    load_step: LoadStepDraw = LoadStepDraw()
-    source_step: SourceStepDraw = SourceStepDraw()
+    groups: tuple[Group, ...] = ()
+    events: Events = Events()
     instruments: Instruments = Instruments()
     device: Device = Device()
     detector: DetectorOptions = DetectorOptions()
     reference: ReferenceSettings = ReferenceSettings()
     certificate: CertificateDemand = CertificateDemand()
+
+    def setting_groups(self) -> tuple[Group, ...]:
+        """Return the states of the network, at least one: "normal" where none is named.
+
+        Examples
+        --------
+        >>> Study().setting_groups()
+        (Group(name='normal', closed=None, opened=()),)
+        """
+        return self.groups or (Group(name="normal", closed=self.network.closed),)
