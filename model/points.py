@@ -14,10 +14,10 @@ from .parts import Feeder, Point, Section
 from .states import Probes
 from .topology import Tree, edges, forest, tree_path
 
-__all__ = ["Points", "Terminal", "Where", "find_points", "into_line", "point_probes"]
+__all__ = ["Points", "Side", "Terminal", "find_points", "into_line", "point_probes"]
 
 
-class Where(IntEnum):
+class Side(IntEnum):
     """How an edge lies to a section, in the feeder's normal state."""
 
     PATH = 0  #: between the two points
@@ -25,6 +25,7 @@ class Where(IntEnum):
     UPSTREAM = 2  #: on the way to it, or on what else hangs there
     DOWNSTREAM = 3  #: fed through it
     OTHER = 4  #: on another branch from the source bus
+    NOWHERE = 5  #: an event that stands on no edge
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,7 +45,7 @@ class Terminal:
     load_side: bool  #: with the section cut, nothing behind the terminal could feed it
     line_z1_ohm: complex
     loop_z1_ohm: complex | None  #: of the whole closed loop that the path is part of; None: none
-    where: NDArray[np.int8]  #: (edges,) a Where: how an edge outside lies to the section
+    side: NDArray[np.int8]  #: (edges,) a Side: how each edge lies to the section
 
     @property
     def name(self) -> str:
@@ -120,7 +121,7 @@ def _terminals(
     on_path = _edges_of_lines(network, lines)
     in_section = on_path | _laterals(feeder, network, lines, ends)
     z1 = sum((li.z1_ohm_per_km * li.length_km for li in feeder.lines if li.name in lines), start=0j)
-    where = _where(feeder, network, tree, on_path, in_section)
+    side = _side(feeder, network, tree, on_path, in_section)
     in_loop = np.append(network.tree.in_loop, network.has_chord)[: on_path.size]
     loop_z1 = _loop_z1(feeder, network, in_loop) if bool(in_loop[on_path].all()) else None
     return [
@@ -136,7 +137,7 @@ def _terminals(
             or not _reaches_feed(feeder, network, network.node(here.bus), in_section),
             line_z1_ohm=z1,
             loop_z1_ohm=loop_z1,
-            where=where,
+            side=side,
         )
         for here, there in (ends, ends[::-1])
     ]
@@ -153,32 +154,32 @@ def _loop_z1(feeder: Feeder, network: Network, in_loop: NDArray[np.bool_]) -> co
     return total
 
 
-def _where(
+def _side(
     feeder: Feeder,
     network: Network,
     tree: Tree,
     on_path: NDArray[np.bool_],
     in_section: NDArray[np.bool_],
 ) -> NDArray[np.int8]:
-    """A Where for every edge, by the ways to the source in the normal state ``tree``."""
+    """The Side of every edge, by the ways to the source in the normal state ``tree``."""
     ways = {bus: _way(tree, bus) for bus in tree}
     ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
     inside = {p.line for k, p in enumerate(network.pieces) if p and on_path[k]}
     nearest = min((ways[ends[line][0]] for line in inside if line), key=len, default=[])
     branch = [name for name in nearest if name not in inside][:1]
-    found = np.full(on_path.size, Where.UPSTREAM, np.int8)
+    found = np.full(on_path.size, Side.UPSTREAM, np.int8)
     for k, piece in enumerate(network.pieces):
         if on_path[k]:
-            found[k] = Where.PATH
+            found[k] = Side.PATH
         elif in_section[k]:
-            found[k] = Where.LATERAL
+            found[k] = Side.LATERAL
         elif piece is not None and piece.line is not None:
             # the way through a line is that of its farther end
             way = max((ways[bus] for bus in ends[piece.line]), key=len)
             if inside & set(way):
-                found[k] = Where.DOWNSTREAM
+                found[k] = Side.DOWNSTREAM
             elif way[:1] != branch:
-                found[k] = Where.OTHER
+                found[k] = Side.OTHER
     return found
 
 

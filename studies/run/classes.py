@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Literal
@@ -9,13 +10,23 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.points import Terminal
+from ...model.points import Side, Terminal
 
-__all__ = ["REPORTED", "DrawClass", "Purpose", "ReportedClass", "Side", "sides"]
+__all__ = [
+    "REPORTED",
+    "DrawClass",
+    "Kind",
+    "Purpose",
+    "ReportedClass",
+    "Side",
+    "SideName",
+    "reported_row",
+    "sides",
+]
 
 
 Kind = Literal["must_trip", "must_not_trip", "apart"]
-SideName = Literal["inside", "outside"]
+SideName = Literal["inside", "upstream", "downstream", "other", "network"]
 
 
 class Purpose(IntEnum):
@@ -35,14 +46,65 @@ class DrawClass(IntEnum):
     LOAD_STEP = 1
     SOURCE_STEP = 2
     OPEN_THREE = 3
+    CAPACITOR_STEP = 4
+    MOTOR_START = 5
+    REGULATOR_TAP = 6
+    EARTH_FAULT = 7
+    LINE_FAULT = 8
+    TIE_SWITCHING = 9
+    TRANSFER = 10
+    DER_TRIP = 11
+    DER_RAMP = 12
+    ENERGISATION = 13
+    RECLOSING = 14
+    SINGLE_POLE = 15
+    FALLEN_SOURCE_SIDE = 16
+    FALLEN_LOAD_SIDE = 17
+    OPEN_WITH_LOAD_STEP = 18
+    OPEN_WITH_DER_TRIP = 19
+    LOAD_SWAP = 20
+    STEP_WITH_TAP = 21
+    WIRING = 22
+
+    @property
+    def words(self) -> str:
+        """The class in a reader's words, in the plural."""
+        return _WORDS[self]
 
 
-class Side(IntEnum):
-    """Where an event stands, seen from a section."""
+_WORDS = {
+    DrawClass.OPEN_PHASE: "breaks",
+    DrawClass.LOAD_STEP: "load steps",
+    DrawClass.SOURCE_STEP: "source steps",
+    DrawClass.OPEN_THREE: "three-phase breaks",
+    DrawClass.CAPACITOR_STEP: "capacitor steps",
+    DrawClass.MOTOR_START: "motor starts",
+    DrawClass.REGULATOR_TAP: "regulator taps",
+    DrawClass.EARTH_FAULT: "earth faults",
+    DrawClass.LINE_FAULT: "line faults",
+    DrawClass.TIE_SWITCHING: "tie switchings",
+    DrawClass.TRANSFER: "transfers",
+    DrawClass.DER_TRIP: "DER trips",
+    DrawClass.DER_RAMP: "DER ramps",
+    DrawClass.ENERGISATION: "energisations",
+    DrawClass.RECLOSING: "reclosings",
+    DrawClass.SINGLE_POLE: "single-pole closings",
+    DrawClass.FALLEN_SOURCE_SIDE: "conductors fallen on the source side",
+    DrawClass.FALLEN_LOAD_SIDE: "conductors fallen on the load side",
+    DrawClass.OPEN_WITH_LOAD_STEP: "breaks with a load step",
+    DrawClass.OPEN_WITH_DER_TRIP: "breaks with a DER trip",
+    DrawClass.LOAD_SWAP: "load swaps",
+    DrawClass.STEP_WITH_TAP: "load steps with a source step",
+    DrawClass.WIRING: "wiring faults",
+}
 
-    OUTSIDE = 0
-    PATH = 1  #: on the path between the two points
-    LATERAL = 2  #: on a lateral that tees off that path
+_AT_SIDE: dict[SideName, str] = {
+    "inside": " inside",
+    "upstream": " upstream",
+    "downstream": " downstream",
+    "other": " on another branch",
+    "network": "",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,32 +117,81 @@ class ReportedClass:
     drawn: DrawClass
     where: tuple[Side, ...]
 
+    @property
+    def words(self) -> str:
+        """The class and its side in a reader's words, in the plural."""
+        if self.name == "open_lateral":
+            return "breaks on laterals inside"
+        return f"{self.drawn.words}{_AT_SIDE[self.side]}"
+
 
 INSIDE = (Side.PATH, Side.LATERAL)
-
-#: name, kind, side, how it is drawn, and where the event must stand
-_TABLE: tuple[tuple[str, Kind, SideName, DrawClass, tuple[Side, ...]], ...] = (
-    ("open_inside", "must_trip", "inside", DrawClass.OPEN_PHASE, (Side.PATH,)),
-    ("load_step", "must_not_trip", "inside", DrawClass.LOAD_STEP, INSIDE),
-    ("load_step", "must_not_trip", "outside", DrawClass.LOAD_STEP, (Side.OUTSIDE,)),
-    ("source_step", "must_not_trip", "outside", DrawClass.SOURCE_STEP, (Side.OUTSIDE,)),
-    ("open_outside", "must_not_trip", "outside", DrawClass.OPEN_PHASE, (Side.OUTSIDE,)),
-    ("open_lateral", "apart", "inside", DrawClass.OPEN_PHASE, (Side.LATERAL,)),
-    ("open_three", "apart", "inside", DrawClass.OPEN_THREE, INSIDE),
-    ("open_three", "apart", "outside", DrawClass.OPEN_THREE, (Side.OUTSIDE,)),
+OUTSIDE: tuple[tuple[SideName, tuple[Side, ...]], ...] = (
+    ("upstream", (Side.UPSTREAM, Side.NOWHERE)),
+    ("downstream", (Side.DOWNSTREAM,)),
+    ("other", (Side.OTHER,)),
 )
 
-REPORTED = tuple(
-    ReportedClass(name=name, kind=kind, side=side, drawn=drawn, where=where)
-    for name, kind, side, drawn, where in _TABLE
+#: classes that stand on no line: they concern the network as a whole
+NETWORK = (
+    DrawClass.SOURCE_STEP,
+    DrawClass.TIE_SWITCHING,
+    DrawClass.TRANSFER,
+    DrawClass.DER_RAMP,
 )
+
+#: in neither count, wherever they stand
+APART = (
+    DrawClass.OPEN_THREE,
+    DrawClass.SINGLE_POLE,
+    DrawClass.FALLEN_SOURCE_SIDE,
+    DrawClass.FALLEN_LOAD_SIDE,
+    DrawClass.WIRING,
+)
+
+#: breaks that something else hides or imitates: inside they are in neither count
+COINCIDENT = (DrawClass.OPEN_WITH_LOAD_STEP, DrawClass.OPEN_WITH_DER_TRIP)
+
+
+def _reported() -> Iterator[ReportedClass]:
+    """Every class on every side, in the order in which results list them."""
+
+    def row(
+        name: str, kind: Kind, side: SideName, drawn: DrawClass, where: tuple[Side, ...]
+    ) -> ReportedClass:
+        return ReportedClass(name=name, kind=kind, side=side, drawn=drawn, where=where)
+
+    yield row("open_inside", "must_trip", "inside", DrawClass.OPEN_PHASE, (Side.PATH,))
+    for side, where in OUTSIDE:
+        yield row("open_outside", "must_not_trip", side, DrawClass.OPEN_PHASE, where)
+    yield row("open_lateral", "apart", "inside", DrawClass.OPEN_PHASE, (Side.LATERAL,))
+    for drawn in DrawClass:
+        name = drawn.name.lower()
+        if drawn == DrawClass.OPEN_PHASE:
+            continue
+        if drawn in NETWORK:
+            yield row(name, "must_not_trip", "network", drawn, tuple(Side))
+            continue
+        inside: Kind = "apart" if drawn in (*APART, *COINCIDENT) else "must_not_trip"
+        yield row(name, inside, "inside", drawn, INSIDE)
+        for side, where in OUTSIDE:
+            yield row(name, "apart" if drawn in APART else "must_not_trip", side, drawn, where)
+
+
+REPORTED = tuple(_reported())
+"""Every class on every side; an event counts in one row at most."""
+
+
+def reported_row(drawn: DrawClass) -> NDArray[np.int64]:
+    """(Side,): the row of ``REPORTED`` in which an event counts, by its side; -1: in none."""
+    rows = np.full(len(Side), -1, np.int64)
+    for r, own in enumerate(REPORTED):
+        if own.drawn == drawn:
+            rows[list(own.where)] = r
+    return rows
 
 
 def sides(terminals: tuple[Terminal, ...], edge: NDArray[np.int64]) -> NDArray[np.int8]:
-    """(T, S): the Side of each event's edge for each terminal; no edge is outside."""
-    table = np.zeros((len(terminals), terminals[0].on_path.size + 1), np.int8)
-    for t, terminal in enumerate(terminals):
-        table[t, :-1] = np.where(
-            terminal.on_path, Side.PATH, np.where(terminal.in_section, Side.LATERAL, Side.OUTSIDE)
-        )
-    return np.asarray(table[:, edge])
+    """(T, S): the Side of each event's edge for each terminal."""
+    table = np.stack([np.append(terminal.side, Side.NOWHERE) for terminal in terminals])
+    return np.asarray(table[:, edge], np.int8)

@@ -10,19 +10,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...detector.instruments import disc_noise
-from ...model.events.base import Event, Places, apply_event, places_on
-from ...model.events.load_step import draw_load_step
-from ...model.events.open_phase import draw_open_phase, draw_open_three
-from ...model.events.source_step import draw_source_step
-from ...model.network import CONNECTIONS, Network, compile_network
-from ...model.parts import Feeder
-from ...model.points import Points, find_points
+from ...detector.instruments import Errors, draw_errors
+from ...model.events.base import Event, apply_event
+from ...model.machines import DER_MODELS, machine_state
+from ...model.network import CONNECTIONS
+from ...model.solve import quiet_state
 from ...model.states import State
+from .cases import Case, Group, Wired, make_case, make_cases
 from .classes import DrawClass, Purpose
-from .spec import Study
+from .draw_event import draw_event, draw_wiring
+from .spec_correlations import draw_scalars
 
-__all__ = ["BlockId", "Case", "Scenarios", "draw_event", "draw_scenarios", "make_case", "stream"]
+__all__ = [
+    "BlockId",
+    "Case",
+    "Group",
+    "Scenarios",
+    "draw_scenarios",
+    "make_case",
+    "make_cases",
+    "stream",
+]
+
+Int = NDArray[np.int64]
+Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,116 +45,125 @@ class BlockId:
     attempt: int
     drawn: DrawClass
     block: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Case:
-    """A feeder and a study, compiled: everything that a block needs."""
-
-    feeder: Feeder
-    study: Study
-    network: Network
-    points: Points
-    lines: Places  #: every line, for breaks
-    regions: tuple[Places, ...]  #: each section's lines, and those in none, for load steps
-    yg_d_units: NDArray[np.int64]  #: units that may be Yg/D, in order
+    group: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scenarios:
-    """S scenarios: two network states, the event between them, and errors in units of bound."""
+    """S scenarios: two network states, the event between them, and the instruments' errors."""
 
+    first: Wired  #: the network before the event
+    second: Wired  #: and after it; the same but for switching
     before: State
     after: State
     event: Event
-    v_error: NDArray[np.complex128]  #: (2, P, 3, S)
-    i_error: NDArray[np.complex128]  #: (2, P, 3, S)
-
-
-def make_case(feeder: Feeder, study: Study) -> Case:
-    """Compile ``feeder`` for ``study``."""
-    closed = study.network.closed
-    network = compile_network(feeder, None if closed is None else frozenset(closed))
-    points = find_points(feeder, network)
-    sections = [terminal.in_section for terminal in points.terminals[::2]]
-    rest = ~np.any(sections, axis=0)
-    regions = [places_on(network, chosen) for chosen in [*sections, rest]]
-    return Case(
-        feeder=feeder,
-        study=study,
-        network=network,
-        points=points,
-        lines=places_on(network),
-        regions=tuple(region for region in regions if region.edges.size),
-        yg_d_units=np.array(
-            [network.units.index(name) for name in study.transformers.yg_d], np.int64
-        ),
-    )
+    der_model: Int  #: (D, S) index into ``DER_MODELS``
+    errors: Errors
+    miswired: tuple[Int, Int]  #: (S,) point and kind of its wrong wiring; kind 0: none
 
 
 def stream(which: BlockId) -> np.random.Generator:
     """The block's own independent stream."""
-    key = (int(which.purpose), which.attempt, int(which.drawn), which.block)
-    seeds = np.random.SeedSequence(which.seed, spawn_key=key)
-    return np.random.Generator(np.random.SFC64(seeds))
+    key = [int(which.purpose), which.attempt, int(which.drawn), which.block]
+    if which.group:  # a study with one network state has the contract's four
+        key.append(which.group)
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(which.seed, spawn_key=key)))
 
 
 def draw_scenarios(case: Case, which: BlockId, size: int) -> Scenarios:
     """Draw one block of ``size`` scenarios."""
     rng = stream(which)
-    before, after = _draw_states(rng, case, size)
+    before, after, der_model = _draw_states(rng, case, size)
     event = draw_event(rng, case, which.drawn, size)
     before, after = apply_event(case.network, before, after, event)
-    shape = (2, len(case.points.names), 3, size)
+    first, second = _switched(case, which)
+    if first.network is not second.network:
+        before = before._replace(ratio=_file_ratio(first, size))
+        after = after._replace(ratio=_file_ratio(second, size))
+    errors = draw_errors(rng, len(case.points.names), size)
     return Scenarios(
+        first=first,
+        second=second,
         before=before,
         after=after,
         event=event,
-        v_error=disc_noise(rng, shape),
-        i_error=disc_noise(rng, shape),
+        der_model=der_model,
+        errors=errors,
+        miswired=draw_wiring(rng, case, which.drawn, size),
     )
 
 
-def _draw_states(rng: np.random.Generator, case: Case, size: int) -> tuple[State, State]:
-    """States ΔT ago and now, without the event: only the ambient changes lie between them."""
-    loads, ambient, network = case.study.loads, case.study.ambient, case.network
+def _switched(case: Case, which: BlockId) -> tuple[Wired, Wired]:
+    """The network before and after: blocks of switching go to each other state and back."""
+    states = {DrawClass.TIE_SWITCHING: case.ties, DrawClass.TRANSFER: case.transfers}
+    others = states.get(which.drawn, ())
+    if not others:
+        return case.wired, case.wired
+    other = others[which.block // 2 % len(others)]
+    return (other, case.wired) if which.block % 2 else (case.wired, other)
+
+
+def _file_ratio(wired: Wired, size: int) -> Real:
+    return np.repeat(wired.network.ratio[:, :, None], size, axis=2)
+
+
+def _draw_states(rng: np.random.Generator, case: Case, size: int) -> tuple[State, State, Int]:
+    """States ΔT ago and now, without the event, and what the DER are.
+
+    Only the ambient changes lie between the two.
+    """
+    study, network = case.study, case.network
+    scalars = draw_scalars(rng, study, size)
     shape = (len(network.loads), size)
-    scale = rng.uniform(*loads.level, size) * rng.uniform(*loads.each, shape)
-    spread = rng.uniform(-loads.exponent_spread, loads.exponent_spread, shape)
-    exponent = np.clip(rng.uniform(*loads.exponent, size) + spread, 0.0, 2.0)
-    connection = np.repeat(network.connection[:, None], size, axis=1)
-    fewest, most = case.study.transformers.yg_d_count
-    count = rng.integers(fewest, most + 1, size)
+    scale = scalars["loads.level"] * study.loads.each.draw(rng, shape)
+    spread = rng.uniform(-study.loads.exponent_spread, study.loads.exponent_spread, shape)
+    exponent = np.clip(scalars["loads.exponent"] + spread, 0.0, 2.0)
+    source_change = scalars["ambient.source_pct"] / 100.0
+    load_change = rng.uniform(-study.ambient.load_pct, study.ambient.load_pct, shape) / 100.0
+    machines = _machine_draws(case, scalars, size)
+    before = quiet_state(
+        network, scale, exponent, machine_state(network, scale, exponent, **machines)
+    )
+    before = before._replace(connection=_draw_connections(rng, case, scalars, before))
+    later = machine_state(network, scale * (1.0 + load_change), exponent, **machines)
+    after = before._replace(**later)
+    after = after._replace(emf_pu=before.emf_pu * (1.0 + source_change))
+    return before, after, _draw_der_models(rng, case, size)
+
+
+def _machine_draws(case: Case, scalars: dict[str, Real], size: int) -> dict[str, Real]:
+    """Those arguments of ``machine_state`` that the study draws."""
+    machines = case.network.machines
+    rows = {
+        "share": ("motors.share", machines.motor_load.size),
+        "y2_y1": ("motors.y2_y1", machines.motor_load.size),
+        "der_level": ("ders.level", len(machines.ders)),
+    }
+    return {
+        name: np.broadcast_to(scalars[scalar], (count, size))
+        for name, (scalar, count) in rows.items()
+        if scalar in scalars
+    }
+
+
+def _draw_connections(
+    rng: np.random.Generator, case: Case, scalars: dict[str, Real], state: State
+) -> Int:
+    """(U, S) winding connections: the file's, the unknown ones drawn, some of them Yg/D."""
+    connection = state.connection.copy()
+    size = connection.shape[1]
+    for unit in case.unknown_units:
+        choices = case.unknown_choices.draw(rng, size)
+        connection[unit] = case.unknown_connections[choices]
     for n, unit in enumerate(case.yg_d_units):
-        connection[unit, count > n] = CONNECTIONS["Yg/D"]
-    emf = np.full(size, network.emf_pu)
-    source_change = rng.uniform(-ambient.source_pct, ambient.source_pct, size) / 100.0
-    load_change = rng.uniform(-ambient.load_pct, ambient.load_pct, shape) / 100.0
-    before = State(
-        emf_pu=emf,
-        load_scale=scale,
-        exponent=exponent,
-        connection=connection,
-        edge=np.full(size, -1, np.int64),
-        share=np.zeros(size),
-        open_mask=np.zeros(size, np.int64),
-        step_y_s=np.zeros((3, size), np.complex128),
-        step_exponent=np.full(size, 2.0),
-    )
-    after = before._replace(
-        emf_pu=emf * (1.0 + source_change), load_scale=scale * (1.0 + load_change)
-    )
-    return before, after
+        connection[unit, scalars["transformers.yg_d_count"] > n] = CONNECTIONS["Yg/D"]
+    return connection
 
 
-def draw_event(rng: np.random.Generator, case: Case, drawn: DrawClass, size: int) -> Event:
-    """The events of one class."""
-    study = case.study
-    if drawn == DrawClass.OPEN_PHASE:
-        return draw_open_phase(rng, size, case.lines, study.open_phase.two_phase_share)
-    if drawn == DrawClass.OPEN_THREE:
-        return draw_open_three(rng, size, case.lines)
-    if drawn == DrawClass.SOURCE_STEP:
-        return draw_source_step(rng, size, study.source_step.pct)
-    step = study.load_step
-    return draw_load_step(rng, size, case.regions, step.kw, step.single_phase_share, step.exponent)
+def _draw_der_models(rng: np.random.Generator, case: Case, size: int) -> Int:
+    """(D, S) what each DER keeps when something happens."""
+    machines, choices = case.network.machines, case.study.ders.model
+    if choices is None:
+        return np.repeat(machines.der_model[:, None], size, axis=1)
+    codes = np.array([DER_MODELS.index(name) for name in choices.values], np.int64)
+    return codes[choices.draw(rng, (len(machines.ders), size))]

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...detector.evidence import Evidence, Phasors, evidence_of
-from ...detector.instruments import measure
+from ...detector.criteria import Options
+from ...detector.evidence import Evidence, evidence_of
+from ...detector.instruments import Bounds, measure, miswire
+from ...detector.supervision import wiring_alarm
+from ...model.machines import carried_over
+from ...model.network import Network
 from ...model.points import into_line, point_probes
 from ...model.solve import solve, steady_state
 from ...model.states import Answer, State
-from .classes import sides
-from .draw import Case, Scenarios
+from .cases import Case, Wired
+from .draw import Scenarios
+from .draw_event import event_sides
+from .spec import Study
 
-__all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "observe"]
+__all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "bounds_of", "observe", "options_of"]
 
 BLOCK = 2000  #: scenarios a block; part of every random stream, so never a matter of jobs
 TOLERANCE_PU = 1e-7  #: last change of a winding voltage; the instruments add 1.3e-4
@@ -27,7 +33,7 @@ Int = NDArray[np.int64]
 class Observed:
     """A block's evidence with the truth."""
 
-    evidence: Evidence  #: (T, S)
+    evidence: Evidence  #: of T terminals in S scenarios
     side: NDArray[np.int8]  #: (T, S)
     connected: NDArray[np.bool_]  #: (S,) a break here has something connected beyond it
     edge: Int  #: (S,)
@@ -35,56 +41,90 @@ class Observed:
     flags: Int  #: (S,)
 
 
-def observe(case: Case, scenarios: Scenarios) -> Observed:
-    """Solve both states, measure, and reduce to evidence."""
-    probes = point_probes(case.points)
+def options_of(study: Study) -> Options:
+    """The detector's options that a study asks for."""
+    own = study.detector
+    return Options(
+        negative_sign=own.negative_sign,
+        fallback=own.fallback,
+        compensated=own.compensated,
+        any_sequence=own.any_sequence,
+        floor_v=own.floor_v,
+        waive_sign_below_a=own.waive_sign_below_a,
+        unbalance=own.unbalance,
+        direction=own.direction,
+        both_ends=own.both_ends,
+    )
+
+
+def bounds_of(case: Case) -> Bounds:
+    """The instruments' errors, at the feeder's frequency and over the detector's ΔT."""
+    own = case.study.instruments
+    return Bounds(
+        tve_pct=own.tve_pct,
+        current_floor_a=own.current_floor_a,
+        ratio_pct=own.ratio_pct,
+        angle_mrad=own.angle_mrad,
+        clock_us=own.clock_us,
+        frequency_hz=own.frequency_hz,
+        nominal_hz=case.feeder.source.frequency_hz,
+        dt_s=case.study.detector.dt_ms / 1000.0,
+    )
+
+
+def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
+    """Solve both states, measure, and reduce to the evidence that ``options`` ask for."""
+    first, second, event = scenarios.first, scenarios.second, scenarios.event
     before = solve(
-        case.network,
+        first.network,
         scenarios.before,
-        probes,
-        start=_guess(case, scenarios.before),
+        point_probes(first.points),
+        start=_guess(first.network, scenarios.before),
         tolerance_pu=TOLERANCE_PU,
+    )
+    later = carried_over(
+        second.network,
+        scenarios.before,
+        before,
+        scenarios.after,
+        event.der_factor,
+        scenarios.der_model,
     )
     after = solve(
-        case.network,
-        scenarios.after,
-        probes,
-        start=before.unit_v_pu * (scenarios.after.emf_pu / scenarios.before.emf_pu),
+        second.network,
+        later,
+        point_probes(second.points),
+        start=before.unit_v_pu * (later.emf_pu / scenarios.before.emf_pu),
         tolerance_pu=TOLERANCE_PU,
     )
-    edge = scenarios.event.edge
+    phasors = measure(
+        np.stack([before.v, after.v]),
+        np.stack([_into(first, before), _into(second, after)]),
+        scenarios.errors,
+        bounds_of(case),
+    )
+    point, kind = scenarios.miswired
+    if kind.any():
+        phasors = miswire(phasors, point, kind)
+    terminals, v_nominal_v = case.points.terminals, case.network.tree.v_nominal_v
+    evidence = evidence_of(phasors, terminals, v_nominal_v, *options)
+    edge = event.edge
     return Observed(
-        evidence=evidence_of(
-            _measured(case, (before, after), scenarios),
-            case.points.terminals,
-            case.network.tree.v_nominal_v,
-        ),
-        side=sides(case.points.terminals, edge),
+        evidence=replace(evidence, alarm=wiring_alarm(phasors, terminals, v_nominal_v)),
+        side=event_sides(case, event),
         connected=case.network.equipped[edge] & (edge >= 0),
         edge=edge,
-        share=scenarios.event.share,
+        share=event.share,
         flags=before.flags | after.flags,
     )
 
 
-def _guess(case: Case, state: State) -> NDArray[np.float64]:
+def _into(wired: Wired, answer: Answer) -> NDArray[np.complex128]:
+    """(P, 3, S) currents, positive into each point's line."""
+    return answer.i * into_line(wired.points)[:, None, None]
+
+
+def _guess(network: Network, state: State) -> NDArray[np.float64]:
     """Winding voltages near the solution: the drop at nominal load, scaled by the mean load."""
-    drop = 1.0 - solve(case.network, steady_state(case.network)).unit_v_pu
+    drop = 1.0 - solve(network, steady_state(network)).unit_v_pu
     return np.asarray(1.0 - drop * state.load_scale.mean(axis=0))
-
-
-def _measured(case: Case, frames: tuple[Answer, Answer], scenarios: Scenarios) -> Phasors:
-    """What the instruments make of the two solved frames."""
-    instruments = case.study.instruments
-    into = into_line(case.points)[:, None, None]
-    v = [
-        measure(frame.v, scenarios.v_error[n], instruments.tve_pct, 0.0)
-        for n, frame in enumerate(frames)
-    ]
-    i = [
-        measure(
-            frame.i * into, scenarios.i_error[n], instruments.tve_pct, instruments.current_floor_a
-        )
-        for n, frame in enumerate(frames)
-    ]
-    return Phasors(v=np.stack(v), i=np.stack(i))

@@ -7,16 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...detector.criteria import Reason, Settings, reach_ohm, verdict
-from ...detector.evidence import Evidence
+from ...detector.criteria import Options, Reason, Settings, reach_of, verdict
+from ...detector.evidence import only
 from ...model.breaks import DEAD, FLOATING
 from ...model.states import NOT_CONVERGED
 from ...optimise.counts import Corners, Grid, corners_of
 from ...optimise.staircase import Front, front_of
 from .along import distance_share
-from .classes import REPORTED, DrawClass
-from .draw import BlockId, Case, draw_scenarios
-from .engine import BLOCK, Observed, observe
+from .cases import Case
+from .classes import REPORTED, DrawClass, reported_row
+from .draw import BlockId, draw_scenarios
+from .engine import BLOCK, Observed, observe, options_of
+from .verdicts import pack_verdicts
 
 __all__ = ["PLACES", "Tested", "Trained", "device_grid", "judge_block", "train_block"]
 
@@ -24,6 +26,7 @@ PLACES = 40  #: stretches of a section in which breaks are counted for the profi
 KEPT = 40  #: scenarios of a block whose evidence is kept for pictures
 
 Int = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,12 +48,14 @@ class Tested:
     trials: Int  #: (R, T) per reported class
     effective: Int  #: (R, T) with |ΔI1| > I_set/2 and |ΔV1| <= V_set
     trips: Int  #: (K, R, T)
+    alarms: Int  #: (R, T) with the wiring alarm
     reachable: Int  #: (T,) internal breaks with something connected beyond them
     found: Int  #: (K, T) of these
     missed: Int  #: (T, Reason) of these, by the criterion that failed
     profile: Int  #: (T, PLACES, 2) internal breaks along the section: all, found
     front: tuple[Front, ...]  #: false trips of the chosen setting, per terminal
     flags: Int  #: (3,) scenarios dead, floating, not converged
+    verdicts: NDArray[np.uint8]  #: (T, S) what the first setting said, as ``pack_verdicts``
     sample: NDArray[np.float64]  #: (T, 4, KEPT) |ΔI1| A, |ΔV1| pu, Z1 real and imaginary Ω
     sample_side: NDArray[np.int8]  #: (T, KEPT)
 
@@ -67,29 +72,30 @@ def device_grid(case: Case) -> Grid:
 
 def train_block(case: Case, which: BlockId, size: int = BLOCK) -> Trained:
     """Draw and judge a training block for every setting of the device at once."""
-    seen = observe(case, draw_scenarios(case, which, size))
+    options = options_of(case.study)
+    seen = observe(case, draw_scenarios(case, which, size), options)
     grid, margin = device_grid(case), case.study.certificate.margin
-    evidence = seen.evidence
-    reach = reach_ohm(evidence, case.study.detector.negative_sign)
-    identity = _identity(which, size)
-    terminals = range(len(case.points.terminals))
+    reach = reach_of(seen.evidence, options)
+    rows, identity = _rows(which.drawn, seen), _identity(which, size)
     opens, stiff, false, front = [], [], [], []
-    for t in terminals:
-        i, v, z = evidence.di1_a[t], evidence.dv1_pu[t], reach[t]
-        judged = not case.points.terminals[t].load_side
-        must = _of_kind("must_trip", which.drawn, seen.side[t]) & seen.connected & judged
-        must_not = _of_kind("must_not_trip", which.drawn, seen.side[t]) & judged
-        opens.append(corners_of(grid, i[must], v[must], z[must]))
-        stiff.append(corners_of(grid, i[must] / margin, v[must] * margin, z[must] / margin))
-        false.append(corners_of(grid, i[must_not], v[must_not], z[must_not]))
-        front.append(front_of(i[must_not], v[must_not], z[must_not], identity[must_not]))
+    for t, terminal in enumerate(case.points.terminals):
+        i, v, z = reach.di_a[t], reach.dv_pu[t], reach.z_ohm[t]
+        must = _of_kind("must_trip", rows[t]) & seen.connected
+        must &= bool(case.judged[t]) and not terminal.load_side
+        must_not = _of_kind("must_not_trip", rows[t]) & case.judged[t]
+        own = i[:, must], v[:, must], z[:, must]
+        other = i[:, must_not], v[:, must_not], z[:, must_not]
+        opens.append(corners_of(grid, *own))
+        stiff.append(corners_of(grid, own[0] / margin, own[1] * margin, own[2] / margin))
+        false.append(corners_of(grid, *other))
+        front.append(front_of(*other, identity[must_not]))
     return Trained(
         opens=tuple(opens),
         stiff=tuple(stiff),
         false=tuple(false),
         front=tuple(front),
-        trials=_trials(which.drawn, seen.side),
-        reachable=_reachable(which.drawn, seen).sum(axis=1),
+        trials=_counted(rows),
+        reachable=_reachable(rows, seen).sum(axis=1),
     )
 
 
@@ -100,112 +106,126 @@ def judge_block(
 
     ``settings[t]`` holds the K settings of terminal t, the chosen one first; None never trips.
     """
-    seen = observe(case, draw_scenarios(case, which, size))
-    terminals, evidence = len(case.points.terminals), seen.evidence
-    ways = len(settings[0])
-    reason = np.full((ways, terminals, size), Reason.BLOCKED, np.int8)
-    effective = np.zeros((len(REPORTED), terminals), np.int64)
-    fronts = []
-    identity = _identity(which, size)
-    reach = reach_ohm(evidence, case.study.detector.negative_sign)
-    for t in range(terminals):
-        one = _only(evidence, t)
-        for k, own in enumerate(settings[t]):
-            if own is not None:
-                reason[k, t] = verdict(one, own)[0]
-        chosen = settings[t][0]
-        if chosen is not None:
-            near = (evidence.di1_a[t] > chosen.i_set_a / 2) & (
-                evidence.dv1_pu[t] <= chosen.v_set_pu
-            )
-            effective[:, t] = [
-                (near & _in_class(r, which.drawn, seen.side[t])).sum() for r in range(len(REPORTED))
-            ]
-        bad = _of_kind("must_not_trip", which.drawn, seen.side[t]) & (reason[0, t] == Reason.TRIP)
-        fronts.append(
-            front_of(evidence.di1_a[t, bad], evidence.dv1_pu[t, bad], reach[t, bad], identity[bad])
-        )
+    asked = _asked(settings)
+    seen = observe(case, draw_scenarios(case, which, size), *asked)
+    evidence, rows = seen.evidence, _rows(which.drawn, seen)
+    reason = _reasons(seen, settings, size)
     trip = reason == Reason.TRIP
-    reachable = _reachable(which.drawn, seen)
-    kept = slice(0, KEPT)
+    reachable = _reachable(rows, seen)
+    terminals, kept = range(len(settings)), slice(0, KEPT)
+    missed = reachable & ~trip[0]
+    sample = (evidence.di1_a, evidence.dv1_pu, evidence.z1_ohm.real, evidence.z1_ohm.imag)
     return Tested(
-        trials=_trials(which.drawn, seen.side),
-        effective=effective,
-        trips=np.stack([_trials(which.drawn, seen.side, trip[k]) for k in range(ways)]),
+        trials=_counted(rows),
+        effective=_counted(rows, _effective(seen, settings)),
+        trips=np.stack([_counted(rows, own) for own in trip]),
+        alarms=_counted(rows, _alarmed(seen)),
         reachable=reachable.sum(axis=1),
         found=(trip & reachable).sum(axis=2),
         missed=np.stack(
-            [
-                np.bincount(reason[0, t, reachable[t] & ~trip[0, t]], minlength=len(Reason))
-                for t in range(terminals)
-            ]
+            [np.bincount(reason[0, t, missed[t]], minlength=len(Reason)) for t in terminals]
         ),
-        profile=_profile(case, which.drawn, seen, trip[0]),
-        front=tuple(fronts),
+        profile=_profile(case, rows, seen, trip[0]),
+        front=tuple(
+            _false_trips(seen, t, settings[t][0], rows[t], trip[0, t], _identity(which, size))
+            for t in terminals
+        ),
         flags=np.array([(seen.flags & bit != 0).sum() for bit in (DEAD, FLOATING, NOT_CONVERGED)]),
-        sample=np.stack(
-            [
-                evidence.di1_a[:, kept],
-                evidence.dv1_pu[:, kept],
-                evidence.z1_ohm.real[:, kept],
-                evidence.z1_ohm.imag[:, kept],
-            ],
-            axis=1,
-        ),
+        verdicts=pack_verdicts(reason[0], seen.side, seen.connected),
+        sample=np.stack([values[:, kept] for values in sample], axis=1),
         sample_side=seen.side[:, kept],
     )
 
 
+def _asked(settings: tuple[tuple[Settings | None, ...], ...]) -> tuple[Options, ...]:
+    """The options of all settings, each once."""
+    found = [own.options for pair in settings for own in pair if own is not None]
+    return tuple(dict.fromkeys(found))
+
+
+def _reasons(
+    seen: Observed, settings: tuple[tuple[Settings | None, ...], ...], size: int
+) -> NDArray[np.int8]:
+    """(K, T, S) a Reason for each setting; blocked where there is none."""
+    shape = (len(settings[0]), len(settings), size)
+    reason = np.full(shape, Reason.BLOCKED, np.int8)
+    for t, pair in enumerate(settings):
+        one = only(seen.evidence, t)
+        for k, own in enumerate(pair):
+            if own is not None:
+                reason[k, t] = verdict(one, own)[0]
+    return reason
+
+
+def _effective(seen: Observed, settings: tuple[tuple[Settings | None, ...], ...]) -> Flags:
+    """(T, S) scenarios that come near the thresholds of the first setting."""
+    found = np.zeros(seen.side.shape, np.bool_)
+    for t, (chosen, *_) in enumerate(settings):
+        if chosen is not None:
+            near = seen.evidence.di1_a[t] > chosen.i_set_a / 2
+            found[t] = near & (seen.evidence.dv1_pu[t] <= chosen.v_set_pu)
+    return found
+
+
+def _alarmed(seen: Observed) -> Flags:
+    alarm = seen.evidence.alarm
+    return np.zeros(seen.side.shape, np.bool_) if alarm is None else alarm != 0
+
+
+def _false_trips(
+    seen: Observed, t: int, chosen: Settings | None, rows: Int, trip: Flags, identity: Int
+) -> Front:
+    """The front of the events that tripped the chosen setting of terminal t and must not."""
+    bad = _of_kind("must_not_trip", rows) & trip
+    reach = reach_of(only(seen.evidence, t), chosen.options if chosen else Options(fallback=False))
+    return front_of(
+        reach.di_a[0][:, bad], reach.dv_pu[0][:, bad], reach.z_ohm[0][:, bad], identity[bad]
+    )
+
+
 def _identity(which: BlockId, size: int) -> Int:
-    """(S, 3): class, block and index, by which fronts know their scenarios."""
-    return np.column_stack(
-        (np.full(size, int(which.drawn)), np.full(size, which.block), np.arange(size))
-    )
+    """(S, 4): class, block, index and group, by which fronts know their scenarios."""
+    found = np.empty((size, 4), np.int64)
+    found[:, 0], found[:, 1], found[:, 3] = which.drawn, which.block, which.group
+    found[:, 2] = np.arange(size)
+    return found
 
 
-def _only(evidence: Evidence, t: int) -> Evidence:
-    """The evidence of one terminal, still two-dimensional."""
-    one = slice(t, t + 1)
-    return Evidence(
-        di1_a=evidence.di1_a[one],
-        dv1_pu=evidence.dv1_pu[one],
-        z1_ohm=evidence.z1_ohm[one],
-        blocked=evidence.blocked[one],
-        undefined=evidence.undefined[one],
-    )
+def _rows(drawn: DrawClass, seen: Observed) -> Int:
+    """(T, S): the row of ``REPORTED`` in which each event counts; -1: in none."""
+    return reported_row(drawn)[seen.side]
 
 
-def _in_class(r: int, drawn: DrawClass, side: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Scenarios that count in reported class r."""
-    own = REPORTED[r]
-    return np.isin(side, own.where) if own.drawn == drawn else np.zeros(side.shape, np.bool_)
+_KINDS = np.array([own.kind for own in REPORTED] + [""])
 
 
-def _of_kind(kind: str, drawn: DrawClass, side: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Scenarios in any reported class of this kind."""
-    masks = [_in_class(r, drawn, side) for r, own in enumerate(REPORTED) if own.kind == kind]
-    return np.asarray(np.any(masks, axis=0))
+def _of_kind(kind: str, rows: Int) -> Flags:
+    """Events that count in rows of this kind."""
+    return np.asarray((_KINDS == kind)[rows])
 
 
-def _trials(
-    drawn: DrawClass, side: NDArray[np.int8], among: NDArray[np.bool_] | None = None
-) -> Int:
-    """(R, T): scenarios in each reported class, or those of them that are ``among``."""
-    masks = np.stack([_in_class(r, drawn, side) for r in range(len(REPORTED))])
-    return np.asarray((masks if among is None else masks & among).sum(axis=2), np.int64)
+def _counted(rows: Int, among: Flags | None = None) -> Int:
+    """(R, T): events in each row of ``REPORTED``, or those of them that are ``among``."""
+    found = np.zeros((len(REPORTED), rows.shape[0]), np.int64)
+    for t, own in enumerate(rows):
+        chosen = own if among is None else own[among[t]]
+        found[:, t] = np.bincount(chosen[chosen >= 0], minlength=len(REPORTED))
+    return found
 
 
-def _reachable(drawn: DrawClass, seen: Observed) -> NDArray[np.bool_]:
+def _reachable(rows: Int, seen: Observed) -> Flags:
     """(T, S): internal breaks with something connected beyond them."""
-    return _of_kind("must_trip", drawn, seen.side) & seen.connected
+    return _of_kind("must_trip", rows) & seen.connected
 
 
-def _profile(case: Case, drawn: DrawClass, seen: Observed, trip: NDArray[np.bool_]) -> Int:
+def _profile(case: Case, rows: Int, seen: Observed, trip: Flags) -> Int:
     """(T, PLACES, 2): internal breaks by distance from the local point, all and found."""
     terminals = case.points.terminals
     counts = np.zeros((len(terminals), PLACES, 2), np.int64)
     for t, terminal in enumerate(terminals):
-        inside = _of_kind("must_trip", drawn, seen.side[t])
+        inside = _of_kind("must_trip", rows[t])
+        if not inside.any():
+            continue
         along = distance_share(case, terminal.local_point, terminal.on_path, seen, inside)
         place = np.minimum((along * PLACES).astype(np.int64), PLACES - 1)
         counts[t, :, 0] = np.bincount(place, minlength=PLACES)

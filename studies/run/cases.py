@@ -1,0 +1,161 @@
+"""Feeder and study, compiled: one case for each network state that has settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.distributions import Choices
+from ...model.events.base import Places, places_on
+from ...model.network import CONNECTIONS, Network, compile_network
+from ...model.parts import Feeder
+from ...model.points import Points, Terminal, find_points
+from .classes import DrawClass
+from .spec import Study
+from .spec_events import CLASSES, SwitchState
+from .spec_parts import UNKNOWN_CONNECTION
+from .spec_parts import Group as GroupSpec
+
+__all__ = ["Case", "Group", "Wired", "make_case", "make_cases"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Group:
+    """A state of the network that has settings: its name, and its place in the study."""
+
+    name: str
+    index: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Wired:
+    """One state of the network, with the points in it."""
+
+    network: Network
+    points: Points
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Case:
+    """A feeder and a study in one network state: everything that a block needs."""
+
+    feeder: Feeder
+    study: Study
+    group: Group
+    network: Network
+    points: Points
+    ties: tuple[Wired, ...]  #: states that tie switching goes to and comes from
+    transfers: tuple[Wired, ...]  #: and transfers
+    lines: Places  #: every line, for breaks
+    regions: tuple[Places, ...]  #: each section's lines, and those in none
+    yg_d_units: NDArray[np.int64]  #: units that may be Yg/D, in order
+    unknown_units: NDArray[np.int64]  #: units whose connection is drawn
+    unknown_choices: Choices
+    unknown_connections: NDArray[np.int64]  #: (choices,) their codes in the solver
+    judged: NDArray[np.bool_]  #: (T,) terminals whose settings are live in this group
+    drawn: tuple[DrawClass, ...]  #: classes that the study asks for and the feeder can have
+
+    @property
+    def wired(self) -> Wired:
+        """The state itself."""
+        return Wired(network=self.network, points=self.points)
+
+
+def make_cases(feeder: Feeder, study: Study) -> tuple[Case, ...]:
+    """Compile ``feeder`` for every network state of ``study``, in the study's order.
+
+    With one setting for all states, a terminal is judged in each of them if it looks at the
+    source in any: a relay keeps its setting where it looks the other way.
+
+    Raises
+    ------
+    InputError
+        For a state that cannot be solved: several loops, or a part that nothing feeds.
+    """
+    groups = study.setting_groups()
+    motors = study.motors.share is not None
+    wired = [_wire(feeder, group, motors) for group in groups]
+    looks = np.array([[not t.load_side for t in state.points.terminals] for state in wired])
+    if study.network.settings == "one":
+        looks = np.tile(looks.any(axis=0), (len(groups), 1))
+    return tuple(
+        _case(feeder, study, Group(name=group.name, index=n), wired[n], looks[n])
+        for n, group in enumerate(groups)
+    )
+
+
+def make_case(feeder: Feeder, study: Study) -> Case:
+    """The case of the study's first network state."""
+    return make_cases(feeder, study)[0]
+
+
+def _wire(feeder: Feeder, state: GroupSpec | SwitchState, motors: bool) -> Wired:
+    closed = None if state.closed is None else frozenset(state.closed)
+    opened = frozenset(state.opened)
+    network = compile_network(feeder, closed, opened, motors=motors)
+    return Wired(network=network, points=find_points(feeder, network, opened))
+
+
+def _case(
+    feeder: Feeder, study: Study, group: Group, wired: Wired, judged: NDArray[np.bool_]
+) -> Case:
+    network, units = wired.network, wired.network.units
+    ties = _others(feeder, study, study.events.tie_switching.states, wired)
+    transfers = _others(feeder, study, study.events.transfer.states, wired)
+    unknown = [n for n, unit in enumerate(feeder.transformers) if unit.connection == "unknown"]
+    choices = study.transformers.unknown or UNKNOWN_CONNECTION[feeder.source.wires]
+    return Case(
+        feeder=feeder,
+        study=study,
+        group=group,
+        network=network,
+        points=wired.points,
+        ties=ties,
+        transfers=transfers,
+        lines=places_on(network),
+        regions=_regions(network, wired.points.terminals),
+        yg_d_units=np.array([units.index(name) for name in study.transformers.yg_d], np.int64),
+        unknown_units=np.array(unknown, np.int64),
+        unknown_choices=choices,
+        unknown_connections=np.array([CONNECTIONS[name] for name in choices.values], np.int64),
+        judged=judged,
+        drawn=_drawn(feeder, study, bool(ties), bool(transfers)),
+    )
+
+
+def _others(
+    feeder: Feeder, study: Study, states: Iterable[SwitchState], own: Wired
+) -> tuple[Wired, ...]:
+    """The states that are not the case's own, compiled."""
+
+    def key(state: Wired) -> set[object]:
+        return {piece.key for piece in state.network.pieces if piece is not None}
+
+    wired = [_wire(feeder, state, study.motors.share is not None) for state in states]
+    return tuple(state for state in wired if key(state) != key(own))
+
+
+def _regions(network: Network, terminals: tuple[Terminal, ...]) -> tuple[Places, ...]:
+    sections = [terminal.in_section for terminal in terminals[::2]]
+    rest = ~np.any(sections, axis=0)
+    regions = [places_on(network, chosen) for chosen in [*sections, rest]]
+    return tuple(region for region in regions if region.edges.size)
+
+
+def _drawn(feeder: Feeder, study: Study, ties: bool, transfers: bool) -> tuple[DrawClass, ...]:
+    """The classes that are wanted and can occur."""
+    impossible = {
+        DrawClass.REGULATOR_TAP: not feeder.regulators,
+        DrawClass.DER_TRIP: not feeder.ders,
+        DrawClass.DER_RAMP: not feeder.ders,
+        DrawClass.OPEN_WITH_DER_TRIP: not feeder.ders,
+        DrawClass.TIE_SWITCHING: not ties,
+        DrawClass.TRANSFER: not transfers,
+    }
+    left_out = {DrawClass(CLASSES.index(name)) for name in study.events.without}
+    return tuple(
+        drawn for drawn in DrawClass if drawn not in left_out and not impossible.get(drawn, False)
+    )
