@@ -7,6 +7,7 @@ quantities (voltages u at HV, w at the middle, e at LV) the load draws  y e - j.
 
 from __future__ import annotations
 
+from .bank_forms import delta_wye, wye_delta, wye_wye
 from .compiled import compiled
 from .matrix3 import (
     IDENTITY,
@@ -25,13 +26,28 @@ from .matrix3 import (
     weighted,
 )
 
-__all__ = ["D_D", "D_YG", "YG_D", "YG_YG", "Y_D", "bank"]
+__all__ = ["D_D", "D_YG", "YG_D", "YG_YG", "Y_D", "bank", "plain_bank"]
 
 YG_YG, D_YG, YG_D, Y_D, D_D = 0, 1, 2, 3, 4  #: winding connections, HV first
 
 ROOT = complex(3.0**-0.5)
 TO_DELTA: Matrix = (ROOT, -ROOT, 0j, 0j, ROOT, -ROOT, -ROOT, 0j, ROOT)  #: u = TO_DELTA V
 FROM_DELTA: Matrix = (ROOT, 0j, -ROOT, -ROOT, ROOT, 0j, 0j, -ROOT, ROOT)  #: its transpose
+
+
+@compiled
+def plain_bank(
+    connection: int, zh: complex, zl: complex, y0: complex, y: Vector
+) -> tuple[Matrix, Matrix]:
+    """``bank`` without magnetizing branch, ``y`` alone across each winding: shunt and winding.
+
+    Only for the connections up to ``YG_D``.
+    """
+    if connection == D_YG:
+        return delta_wye(zh + zl, y)
+    if connection == YG_D:
+        return wye_delta(zh + zl, y)
+    return wye_wye(zh, zl, y0, y)
 
 
 @compiled

@@ -23,11 +23,14 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     Divisions follow numpy (no exception), and a product may be fused with a sum;
     nothing else is reordered, so one CPU type gives one result. Functions are folded
     into their callers: small ones on tuples would otherwise cost more than they compute.
+    They make no arrays and count no references to those they are given: counting, at each
+    call with a record of thirty arrays, took as long as the arithmetic.
     """
     options: dict[str, Any] = {
         "error_model": "numpy",
         "fastmath": {"contract"},
         "forceinline": True,
+        "_nrt": False,
     }
     config: Any = numba.config
     user_s, config.CACHE_DIR = config.CACHE_DIR, _FOLDER

@@ -31,7 +31,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .bank import bank
+from .bank import YG_D, bank, plain_bank
 from .breaks import DEAD, FLOATING, SINGULAR, open_phases, squared
 from .compiled import compiled
 from .matrix3 import (
@@ -92,26 +92,22 @@ def set_admittances(
 ) -> None:
     """What hangs on every node and on the event node, at the winding voltages ``unit_v_pu``."""
     set_loads(tree, state, work, s, unit_v_pu, floor_pu)
-    y, y_j = work.y, work.y_j
-    unit_node = tree.unit_node
+    y, y_j, g, unit_y = work.y, work.y_j, work.g, work.unit_y
+    unit_node, plain, connections = tree.unit_node, tree.unit_plain, state.connection
+    zh, zl, y0 = tree.unit_zh_ohm, tree.unit_zl_ohm, tree.unit_y0_s
+    shunts = tree.shunt_s
     for k in range(y.shape[0]):
-        store(y, k, load(tree.shunt_s, k))
+        store(y, k, load(shunts, k))
         store_vector(y_j, k, (0j, 0j, 0j))
     for unit in range(unit_node.size):
-        node = unit_node[unit]
-        shunt, drawn, winding, fed = bank(
-            state.connection[unit, s],
-            tree.unit_zh_ohm[unit],
-            tree.unit_zl_ohm[unit],
-            tree.unit_y0_s[unit],
-            tree.unit_ym_s[unit],
-            load(work.unit_y, unit),
-            load_vector(work.unit_j, unit),
-        )
+        node, connection = unit_node[unit], connections[unit, s]
+        if not plain[unit] or connection > YG_D:
+            hang_bank(tree, work, unit, connection)
+            continue
+        across = (unit_y[unit, 0, 0], unit_y[unit, 1, 1], unit_y[unit, 2, 2])
+        shunt, winding = plain_bank(connection, zh[unit], zl[unit], y0[unit], across)
         store(y, node, add(load(y, node), shunt))
-        store_vector(y_j, node, plus(load_vector(y_j, node), drawn))
-        store(work.g, unit, winding)
-        store_vector(work.g_j, unit, fed)
+        store(g, unit, winding)
     if tree.charged:
         add_charging(tree, work, state.edge[s])
     node = state.far_node[s]
@@ -122,6 +118,25 @@ def set_admittances(
 
 
 @compiled
+def hang_bank(tree: Tree, work: Work, unit: int, connection: int) -> None:
+    """Hang a bank with machines, a magnetizing branch or rarer windings on its node."""
+    y, y_j, node = work.y, work.y_j, tree.unit_node[unit]
+    shunt, drawn, winding, fed = bank(
+        connection,
+        tree.unit_zh_ohm[unit],
+        tree.unit_zl_ohm[unit],
+        tree.unit_y0_s[unit],
+        tree.unit_ym_s[unit],
+        load(work.unit_y, unit),
+        load_vector(work.unit_j, unit),
+    )
+    store(y, node, add(load(y, node), shunt))
+    store_vector(y_j, node, plus(load_vector(y_j, node), drawn))
+    store(work.g, unit, winding)
+    store_vector(work.g_j, unit, fed)
+
+
+@compiled
 def set_loads(
     tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
 ) -> None:
@@ -129,6 +144,8 @@ def set_loads(
     unit_y, unit_j = work.unit_y, work.unit_j
     load_unit, load_y, machine_unit = tree.load_unit, tree.load_y_s, tree.machine_unit
     load_scale, exponent = state.load_scale, state.exponent
+    machine_va, machine_y, machine_j = state.machine_va, state.machine_y_s, state.machine_j_a
+    follows = state.machine_exponent
     for unit in range(unit_y.shape[0]):
         store(unit_y, unit, ZERO)
         store_vector(unit_j, unit, (0j, 0j, 0j))
@@ -141,17 +158,15 @@ def set_loads(
     turn = complex(-0.5, 0.75**0.5)
     for m in range(machine_unit.size):
         unit = machine_unit[m]
-        power = state.machine_exponent[m, s] - 2.0
-        taken = state.machine_va[m, s].conjugate() / (3.0 * tree.v_nominal_v**2)
-        y0, y2 = state.machine_y_s[m, 0, s], state.machine_y_s[m, 2, s]
-        y1 = state.machine_y_s[m, 1, s] + taken * voltage_factor(
-            unit_v_pu[unit, 3], power, floor_pu
-        )
+        power = follows[m, s] - 2.0
+        taken = machine_va[m, s].conjugate() / (3.0 * tree.v_nominal_v**2)
+        y0, y2 = machine_y[m, 0, s], machine_y[m, 2, s]
+        y1 = machine_y[m, 1, s] + taken * voltage_factor(unit_v_pu[unit, 3], power, floor_pu)
         own = (y0 + y1 + y2) / 3.0
         ahead = (y0 + turn * y1 + turn.conjugate() * y2) / 3.0
         behind = (y0 + turn.conjugate() * y1 + turn * y2) / 3.0
         add_circulant(unit_y, unit, own, ahead, behind)
-        j = state.machine_j_a[m, s]
+        j = machine_j[m, s]
         store_vector(
             unit_j, unit, plus(load_vector(unit_j, unit), (j, j * turn.conjugate(), j * turn))
         )
@@ -167,13 +182,13 @@ def add_circulant(stack: Complex, k: int, own: complex, ahead: complex, behind: 
 @compiled
 def add_charging(tree: Tree, work: Work, edge: int) -> None:
     """Half of every edge's charging at its ends; of the event's edge the parts beyond it."""
-    y = work.y
-    last = tree.parent.size
+    y, parents, end_y = work.y, tree.parent, tree.end_y_s
+    last = parents.size
     for k in range(1, last + (1 if tree.tail >= 0 else 0)):
         if k == edge:
             continue
-        half = load(tree.end_y_s, k)
-        upper, lower = (tree.tail, tree.fork) if k == last else (tree.parent[k], k)
+        half = load(end_y, k)
+        upper, lower = (tree.tail, tree.fork) if k == last else (parents[k], k)
         store(y, upper, add(load(y, upper), half))
         store(y, lower, add(load(y, lower), half))
 
@@ -188,17 +203,17 @@ def set_event_shunts(
     store(event_y, 1, ZERO)
     if edge < 0:
         return
+    step_y, between_y, fallen_y = state.step_y_s, state.between_y_s, state.fallen_y_s
     power = state.step_exponent[s] - 2.0
     for i in range(3):
         following = (i + 1) % 3
-        between = state.between_y_s[i, s]
-        event_y[0, i, i] += between + state.step_y_s[i, s] * voltage_factor(
-            unit_v_pu[-1, i], power, floor_pu
-        )
+        between = between_y[i, s]
+        factor = voltage_factor(unit_v_pu[-1, i], power, floor_pu)
+        event_y[0, i, i] += between + step_y[i, s] * factor
         event_y[0, following, following] += between
         event_y[0, i, following] -= between
         event_y[0, following, i] -= between
-        event_y[1, i, i] += state.fallen_y_s[i, s]
+        event_y[1, i, i] += fallen_y[i, s]
     if tree.charged:
         half = load(tree.end_y_s, edge)
         above, below = scaled(half, share), scaled(half, 1.0 - share)
@@ -222,61 +237,61 @@ def climb(tree: Tree, state: State, work: Work, s: int) -> int:
 
     ``work.y`` holds each node's own admittance and becomes the admittance below it.
     """
-    parents, in_loop, fork = tree.parent, tree.in_loop, tree.fork
-    y_all, w_all, x_all, fill = work.y, work.w, work.x, work.fill
-    edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
+    parents, in_loop, z_all, regulator = tree.parent, tree.in_loop, tree.z_ohm, tree.regulator
+    y_all, y_j, f_all, w_all = work.y, work.y_j, work.f, work.w
+    h_all, x_all, h_j, x_j, fill, fill_j = (
+        work.h,
+        work.x,
+        work.h_j,
+        work.x_j,
+        work.fill,
+        work.fill_j,
+    )
+    edge, share, mask, fork = state.edge[s], state.share[s], state.open_mask[s], tree.fork
     last = parents.size
     sourced = tree.machine_unit.size > 0
     flags = 0
     for k in range(last - 1, -1, -1):
         if k == tree.tail:
             flags |= climb_chord(tree, work, edge == last, share, mask)
-        y, looped = load(y_all, k), in_loop[k]
-        x_j = load_vector(work.y_j, k)
+        y, z, looped, drawn = load(y_all, k), load(z_all, k), in_loop[k], load_vector(y_j, k)
         if k == edge:
-            z = load(tree.z_ohm, k)
-            flags |= climb_event(work, k, y, z, share, mask, looped, x_j)
+            flags |= climb_event(work, k, y, z, share, mask, looped, drawn)
         else:
-            climb_edge(work, k, y, load(tree.z_ohm, k), looped, sourced, x_j)
-            if tree.regulator[k] >= 0:
-                regulate(work, k, state.ratio, tree.regulator[k], s, looped)
+            f, w = up(y, z)
+            store(f_all, k, f)
+            store(w_all, k, w)
+            if sourced:
+                xt = load(fill, 0) if looped else ZERO
+                ahead, drawn, back = carry_current(y, z, f, drawn, xt, load_vector(fill_j, 0))
+                store_vector(h_j, k, ahead)
+                store_vector(x_j, k, drawn)
+                if looped:
+                    store_vector(fill_j, 0, back)
+            if looped:
+                # X of the node below in the chain stands in this node's own slot
+                h, x, xt, u = carry(y, z, f, load(x_all, k), load(fill, 0), load(fill, 1))
+                store(h_all, k, h)
+                store(x_all, k, x)
+                store(fill, 0, xt)
+                store(fill, 1, u)
+            if regulator[k] >= 0:
+                regulate(work, k, state.ratio, regulator[k], s, looped)
         parent = parents[k]
         if parent < 0:
             continue
         total = add(load(y_all, parent), load(w_all, k))
-        drawn = plus(load_vector(work.y_j, parent), load_vector(work.x_j, k))
+        if sourced:
+            drawn = plus(load_vector(y_j, parent), load_vector(x_j, k))
+            if looped and parent == fork:
+                drawn = plus(drawn, load_vector(fill_j, 0))
+            store_vector(y_j, parent, drawn)
         if looped and parent == fork:
             total = add(add(total, load(x_all, k)), add(load(fill, 0), load(fill, 1)))
-            drawn = plus(drawn, load_vector(work.fill_j, 0))
         elif looped:
-            # X of the node below in the chain stands in this node's own slot
             store(x_all, parent, load(x_all, k))
         store(y_all, parent, total)
-        store_vector(work.y_j, parent, drawn)
     return flags
-
-
-@compiled
-def climb_edge(
-    work: Work, k: int, y: Matrix, z: Matrix, looped: bool, sourced: bool, x_j: Vector
-) -> None:
-    """Eliminate edge k."""
-    f, w = up(y, z)
-    store(work.f, k, f)
-    store(work.w, k, w)
-    xt = load(work.fill, 0) if looped else ZERO
-    if sourced:
-        h_j, x_j, u_j = carry_current(y, z, f, x_j, xt, load_vector(work.fill_j, 0))
-        store_vector(work.h_j, k, h_j)
-        if looped:
-            store_vector(work.fill_j, 0, u_j)
-    store_vector(work.x_j, k, x_j)
-    if looped:
-        h, x, xt, u = carry(y, z, f, load(work.x, k), xt, load(work.fill, 1))
-        store(work.h, k, h)
-        store(work.x, k, x)
-        store(work.fill, 0, xt)
-        store(work.fill, 1, u)
 
 
 @compiled
@@ -436,9 +451,10 @@ def lift_neutral(work: Work) -> int:
 @compiled
 def descend(tree: Tree, state: State, work: Work, s: int) -> None:
     """Voltages and currents from the source to the leaves, and the stubs of the event node."""
-    parents, in_loop, fork = tree.parent, tree.in_loop, tree.fork
-    v_all, i_up, i_low = work.v, work.i_up, work.i_low
-    edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
+    parents, in_loop, regulator, ratio = tree.parent, tree.in_loop, tree.regulator, state.ratio
+    v_all, f_all, h_all, w_all, x_all = work.v, work.f, work.h, work.w, work.x
+    h_j, x_j, i_up, i_low = work.h_j, work.x_j, work.i_up, work.i_low
+    edge, share, mask, fork = state.edge[s], state.share[s], state.open_mask[s], tree.fork
     last = parents.size
     sourced = tree.machine_unit.size > 0
     for k in range(last):
@@ -446,11 +462,11 @@ def descend(tree: Tree, state: State, work: Work, s: int) -> None:
         looped = in_loop[k]
         v_fork = load_vector(v_all, fork) if looped else (0j, 0j, 0j)
         if looped:
-            current = both(load(work.w, k), above, load(work.x, k), v_fork)
+            current = both(load(w_all, k), above, load(x_all, k), v_fork)
         else:
-            current = times(load(work.w, k), above)
+            current = times(load(w_all, k), above)
         if sourced:
-            current = plus(current, load_vector(work.x_j, k))
+            current = plus(current, load_vector(x_j, k))
         store_vector(i_up, k, current)
         if k == edge:
             v = descend_event(work, 0, above, v_fork, mask)
@@ -465,16 +481,16 @@ def descend(tree: Tree, state: State, work: Work, s: int) -> None:
             current = plus(current, minus(lost))
         else:
             if looped:
-                v = both(load(work.f, k), above, load(work.h, k), v_fork)
+                v = both(load(f_all, k), above, load(h_all, k), v_fork)
             else:
-                v = times(load(work.f, k), above)
+                v = times(load(f_all, k), above)
             if sourced:
-                v = plus(v, load_vector(work.h_j, k))
+                v = plus(v, load_vector(h_j, k))
         store_vector(i_low, k, current)
-        row = tree.regulator[k]
+        row = regulator[k]
         if row >= 0:
             for i in range(3):
-                i_low[k, i] /= state.ratio[row, i, s]
+                i_low[k, i] /= ratio[row, i, s]
         store_vector(v_all, k, v)
     if tree.tail >= 0:
         v_tail, v_fork = load_vector(v_all, tree.tail), load_vector(v_all, fork)
@@ -505,16 +521,17 @@ def descend_event(work: Work, near: int, above: Vector, v_fork: Vector, mask: in
 @compiled
 def add_charging_currents(tree: Tree, work: Work, edge: int, share: float) -> None:
     """The currents at an edge's ends include what charges that end of it."""
-    last = tree.parent.size
+    parents, end_y, v, i_up, i_low = tree.parent, tree.end_y_s, work.v, work.i_up, work.i_low
+    last = parents.size
     for k in range(1, last + (1 if tree.tail >= 0 else 0)):
-        half = load(tree.end_y_s, k)
-        upper, lower = (tree.tail, tree.fork) if k == last else (tree.parent[k], k)
-        first = times(half, load_vector(work.v, upper))
-        second = times(half, load_vector(work.v, lower))
+        half = load(end_y, k)
+        upper, lower = (tree.tail, tree.fork) if k == last else (parents[k], k)
+        first = times(half, load_vector(v, upper))
+        second = times(half, load_vector(v, lower))
         above, below = (share, 1.0 - share) if k == edge else (1.0, 1.0)
         for i in range(3):
-            work.i_up[k, i] += above * first[i]
-            work.i_low[k, i] -= below * second[i]
+            i_up[k, i] += above * first[i]
+            i_low[k, i] -= below * second[i]
 
 
 @compiled
@@ -525,17 +542,18 @@ def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, fi
     (Anderson's mixing of depth one), which also ends cycles and creeping near collapse.
     ``history`` (3, U + 1, 4): the last pass's voltages and gaps, and this pass's gaps.
     """
-    units = tree.unit_node.size
-    last = 4 if tree.machine_unit.size > 0 else 3
+    unit_node, g, g_j, v_all, stub = tree.unit_node, work.g, work.g_j, work.v, work.stub
+    units = unit_node.size
+    sourced = tree.machine_unit.size > 0
+    last = 4 if sourced else 3
     change = along = across = 0.0
     for unit in range(units + 1):
         if unit < units:
-            v = plus(
-                times(load(work.g, unit), load_vector(work.v, tree.unit_node[unit])),
-                load_vector(work.g_j, unit),
-            )
+            v = times(load(g, unit), load_vector(v_all, unit_node[unit]))
+            if sourced:
+                v = plus(v, load_vector(g_j, unit))
         else:
-            v = load_vector(work.stub, 0)
+            v = load_vector(stub, 0)
         for i in range(last):
             value = v[i] if i < 3 else positive(v)
             size = np.sqrt(value.real**2 + value.imag**2) / tree.v_nominal_v
@@ -566,11 +584,12 @@ def positive(v: Vector) -> complex:
 @compiled
 def is_linear(tree: Tree, state: State, s: int) -> bool:
     """Whether nothing in scenario ``s`` depends on the magnitude of a voltage."""
+    exponent, follows, machine_va = state.exponent, state.machine_exponent, state.machine_va
     linear = state.edge[s] < 0 or state.step_exponent[s] == 2.0
-    for n in range(tree.load_unit.size):
-        linear &= state.exponent[n, s] == 2.0
-    for m in range(tree.machine_unit.size):
-        linear &= state.machine_exponent[m, s] == 2.0 or state.machine_va[m, s] == 0.0
+    for n in range(exponent.shape[0]):
+        linear &= exponent[n, s] == 2.0
+    for m in range(follows.shape[0]):
+        linear &= follows[m, s] == 2.0 or machine_va[m, s] == 0.0
     return linear
 
 
@@ -594,8 +613,7 @@ def solve_block(
     v_node, i_edge, i_below = probes.v_node, probes.i_edge, probes.i_below
     v_out, i_out, stub_out, unit_out = answer.v, answer.i, answer.stub, answer.unit_v_pu
     v, stub, i_up, i_low = work.v, work.stub, work.i_up, work.i_low
-    unit_v_pu = np.empty((unit_out.shape[0], 4))
-    history = np.zeros((3, unit_out.shape[0], 4))
+    unit_v_pu, history = work.unit_v_pu, work.history
     turn = np.exp(-2j * np.pi / 3)
     for s in range(state.emf_pu.size):
         linear = is_linear(tree, state, s)
@@ -605,6 +623,7 @@ def solve_block(
         for unit in range(unit_v_pu.shape[0]):
             for i in range(4):
                 unit_v_pu[unit, i] = unit_out[unit, i, s]
+                history[0, unit, i] = history[1, unit, i] = 0.0
         settled = False
         flags = 0
         passes = 0

@@ -206,7 +206,7 @@ def compile_network(
         tail=tail,
         shunt_s=_capacitor_shunts(feeder, index),
         unit_node=np.array([index[_node_name(feeder, _place(u))] for u in units], np.int64),
-        **_unit_arrays(feeder, units),
+        **_unit_arrays(feeder, units, machines),
         load_unit=load_unit,
         load_y_s=load_y,
         machine_unit=machines.unit,
@@ -432,7 +432,7 @@ def _units(feeder: Feeder) -> list[_Unit]:
     return [*feeder.transformers, *loads, *ders]
 
 
-def _unit_arrays(feeder: Feeder, units: list[_Unit]) -> dict[str, NDArray[np.complex128]]:
+def _unit_arrays(feeder: Feeder, units: list[_Unit], machines: Machines) -> dict[str, Any]:
     """Half leakage and magnetizing admittances of the units, referred to HV."""
     kv = feeder.source.kv_ll
     half, y0, ym = [], [], []
@@ -450,6 +450,7 @@ def _unit_arrays(feeder: Feeder, units: list[_Unit]) -> dict[str, NDArray[np.com
         "unit_zl_ohm": z,
         "unit_y0_s": np.array(y0, np.complex128),
         "unit_ym_s": np.array(ym, np.complex128),
+        "unit_plain": (np.array(ym) == 0) & ~np.isin(np.arange(len(units)), machines.unit),
     }
 
 

@@ -42,6 +42,7 @@ class Tree(NamedTuple):
     unit_zl_ohm: Complex  #: (U,)
     unit_y0_s: Complex  #: (U,) zero-sequence magnetizing admittance of a Yg/Yg unit
     unit_ym_s: Complex  #: (U,) magnetizing admittance
+    unit_plain: NDArray[np.bool_]  #: (U,) neither machines nor magnetizing admittance
     load_unit: Int  #: (L,)
     load_y_s: Complex  #: (L,) per winding at nominal voltage
     machine_unit: Int  #: (M,) motors of loads, then DER
@@ -131,6 +132,8 @@ class Work(NamedTuple):
     stub: Complex  #: (2, 3) voltages of p and q
     i_up: Complex  #: (B + 1, 3) current into each edge's upper end
     i_low: Complex  #: (B + 1, 3) current out of its lower end
+    unit_v_pu: Real  #: (U + 1, 4) the scenario's ``Answer.unit_v_pu``
+    history: Real  #: (3, U + 1, 4) of these: the last pass's, its gaps, and this pass's gaps
 
 
 def workspace(tree: Tree) -> Work:
@@ -165,4 +168,6 @@ def workspace(tree: Tree) -> Work:
         stub=zeros(2, 3),
         i_up=zeros(nodes + 1, 3),
         i_low=zeros(nodes + 1, 3),
+        unit_v_pu=np.zeros((units + 1, 4)),
+        history=np.zeros((3, units + 1, 4)),
     )
