@@ -128,8 +128,11 @@ def evidence_of(
 
 def only(evidence: Evidence, t: int) -> Evidence:
     """The evidence of one terminal, its axis kept at length one."""
-    parts: dict[str, Any] = {f.name: getattr(evidence, f.name) for f in fields(evidence)}
-    return Evidence(**{name: x if x is None else x[t : t + 1] for name, x in parts.items()})
+    parts: dict[str, Any] = {}
+    for field in fields(evidence):
+        values = getattr(evidence, field.name)
+        parts[field.name] = None if values is None else values[t : t + 1]
+    return Evidence(**parts)
 
 
 def with_alarm(evidence: Evidence, alarm: NDArray[np.int8]) -> Evidence:

@@ -44,6 +44,8 @@ def terminal(local: int, remote: int, into: float = 1.0) -> Terminal:
         in_section=np.zeros(0, np.bool_),
         load_side=False,
         line_z1_ohm=0j,
+        loop_z1_ohm=None,
+        side=np.zeros(0, np.int8),
     )
 
 
