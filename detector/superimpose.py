@@ -1,4 +1,4 @@
-"""Positive sequence, and superimposed quantities: now minus the window ΔT earlier, (1)-(2)."""
+"""Sequences, and superimposed quantities: now minus the window ΔT earlier, (1)-(2)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ from numpy.typing import NDArray
 
 from ..model.symmetrical import A
 
-__all__ = ["compensated", "positive_sequence", "superimposed"]
+__all__ = [
+    "compensated",
+    "negative_sequence",
+    "positive_sequence",
+    "superimposed",
+    "zero_sequence",
+]
 
 Complex = NDArray[np.complex128]
 
@@ -18,6 +24,16 @@ def positive_sequence(abc: Complex) -> Complex:
     Shape (..., 3, S) becomes (..., S).
     """
     return np.asarray((abc[..., 0, :] + A * abc[..., 1, :] + A.conjugate() * abc[..., 2, :]) / 3.0)
+
+
+def negative_sequence(abc: Complex) -> Complex:
+    """Negative-sequence component, as ``positive_sequence``."""
+    return np.asarray((abc[..., 0, :] + A.conjugate() * abc[..., 1, :] + A * abc[..., 2, :]) / 3.0)
+
+
+def zero_sequence(abc: Complex) -> Complex:
+    """Zero-sequence component, as ``positive_sequence``."""
+    return np.asarray((abc[..., 0, :] + abc[..., 1, :] + abc[..., 2, :]) / 3.0)
 
 
 def superimposed(now: Complex, earlier: Complex) -> Complex:

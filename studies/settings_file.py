@@ -6,7 +6,7 @@ import csv
 import math
 from pathlib import Path
 
-from ..detector.criteria import Settings
+from ..detector.criteria import Options, Settings
 from ..model.errors import Fault, InputError
 from ..model.fields import did_you_mean
 from ..model.parts import Feeder
@@ -86,7 +86,7 @@ def _settings(row: dict[str, str]) -> tuple[Settings | None, list[tuple[str, str
         wrong.append(("negative_sign", "must be True or False", repr(row["negative_sign"])))
     if wrong:
         return None, wrong
-    return Settings(**numbers, negative_sign=sign == "true"), []
+    return Settings(**numbers, options=Options(negative_sign=sign == "true")), []
 
 
 def _number(text: str) -> float:

@@ -11,10 +11,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..detector.criteria import Reason, Settings, verdict
-from ..detector.evidence import Phasors, evidence_of
-from ..detector.impedance import connection_impedance
-from ..detector.superimpose import compensated, positive_sequence
+from ..detector.criteria import Options, Reason, Settings, reach_of, verdict
+from ..detector.evidence import Evidence, Phasors, evidence_of, only
 from ..model.breaks import FLOATING, UNDEFINED
 from ..model.errors import Fault, InputError, OpenPhaseError, Report
 from ..model.feeder_file import load_feeder
@@ -231,40 +229,48 @@ def _sections(
     if not feeder.sections:
         return []
     points = find_points(feeder, network)
-    phasors = _phasors(points, frames)
-    v1, i1 = positive_sequence(phasors.v), positive_sequence(phasors.i)
-    star = compensated(i1[1], i1[0], v1[1], v1[0])
+    if settings is None:
+        settings = {(t.local, t.remote): DEFAULTS for t in points.terminals}
+    judged = [own.options for own in settings.values() if own is not None]
+    shown = Options(fallback=True, compensated=True)
+    evidence = evidence_of(
+        _phasors(points, frames), points.terminals, network.tree.v_nominal_v, shown, *judged
+    )
     rows = []
-    for terminal in points.terminals:
-        seen = evidence_of(phasors, (terminal,), network.tree.v_nominal_v)
-        m, n, into = terminal.local_point, terminal.remote_point, terminal.into
-        z_abc, undefined = connection_impedance(
-            phasors.v[1, m],
-            phasors.v[1, n],
-            into * phasors.i[1, m],
-            phasors.v[1, m] - phasors.v[0, m],
-            phasors.v[1, n] - phasors.v[0, n],
-            into * (phasors.i[1, m] - phasors.i[0, m]),
-        )
-        own = DEFAULTS if settings is None else settings.get((terminal.local, terminal.remote))
-        reason = None if own is None else Reason(int(verdict(seen, own)[0, 0]))
+    for t, terminal in enumerate(points.terminals):
+        seen = only(evidence, t)
+        assert seen.di_star_a is not None  # it is shown, and so was asked for
+        impedances = [
+            None if undefined else _pair(z)
+            for z, undefined in zip(seen.z_ohm[0, :, 0], seen.undefined[0, :, 0], strict=True)
+        ]
+        trip, reason = _judged(seen, settings.get((terminal.local, terminal.remote)))
         rows.append(
             {
                 "local": terminal.local,
                 "remote": terminal.remote,
                 "di1_a": float(seen.di1_a[0, 0]),
-                "di1_star_a": float(np.abs(star[m, 0])),
+                "di1_star_a": float(seen.di_star_a[0, 0, 0]),
                 "dv1_pu": float(seen.dv1_pu[0, 0]),
-                "z1_ohm": None if seen.undefined[0, 0] else _pair(seen.z1_ohm[0, 0]),
-                "zabc_ohm": [
-                    None if undefined[a, 0] else _pair(z_abc[a, 0]) for a in range(len(PHASES))
-                ],
-                "di_abc_a": np.abs(phasors.i[1, m] - phasors.i[0, m])[:, 0].tolist(),
-                "trip": reason == Reason.TRIP,
-                "reason": reason.text if reason is not None else "no setting in the sheet",
+                "z1_ohm": impedances[0],
+                "zabc_ohm": impedances[1:],
+                "di_abc_a": seen.di_a[0, 1:, 0].tolist(),
+                "trip": trip,
+                "reason": reason,
             }
         )
     return rows
+
+
+def _judged(seen: Evidence, own: Settings | None) -> tuple[bool, str]:
+    """Whether a terminal trips with its setting, and why."""
+    if own is None:
+        return False, "no setting in the sheet"
+    reason = Reason(int(verdict(seen, own)[0, 0]))
+    if reason != Reason.TRIP:
+        return False, reason.text
+    idle = reach_of(seen, own.options).di_a[0, 0, 0] < own.i_set_a
+    return True, "trip: a phase, |ΔI1| being below I_set" if idle else reason.text
 
 
 def _table(feeder: Feeder, broken: Break, answer: dict[str, Any]) -> str:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...detector.criteria import Options
-from ...detector.evidence import Evidence, evidence_of
+from ...detector.evidence import Evidence, evidence_of, with_alarm
 from ...detector.instruments import Bounds, measure, miswire
-from ...detector.supervision import wiring_alarm
+from ...detector.supervision import fed_one_way, wiring_alarm
 from ...model.machines import carried_over
 from ...model.network import Network
 from ...model.points import into_line, point_probes
@@ -108,9 +108,11 @@ def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
         phasors = miswire(phasors, point, kind)
     terminals, v_nominal_v = case.points.terminals, case.network.tree.v_nominal_v
     evidence = evidence_of(phasors, terminals, v_nominal_v, *options)
+    # of the state before the event; behind generation power may flow either way
+    one_way = fed_one_way(first.points.terminals) & (not case.feeder.ders)
     edge = event.edge
     return Observed(
-        evidence=replace(evidence, alarm=wiring_alarm(phasors, terminals, v_nominal_v)),
+        evidence=with_alarm(evidence, wiring_alarm(phasors, terminals, v_nominal_v, one_way)),
         side=event_sides(case, event),
         connected=case.network.equipped[edge] & (edge >= 0),
         edge=edge,

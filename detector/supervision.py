@@ -1,0 +1,164 @@
+"""Supervision of the wiring: what a terminal's two ends report while nothing happens.
+
+It looks at the frame before the event, so that no event can look like wrong wiring, and doubts
+only what a feeder in service cannot be. It sees
+
+- swapped phases, or voltages alone: the negative sequence of V exceeds the positive;
+- rotated phases at one end: the two ends' V1 lie far apart;
+- one reversed current transformer: I2 and I0 both exceed I1, which no load does that takes
+  power in every phase, and turning one phase's current round leaves little of either. Seen
+  whatever the phase while the true |I2| and |I0| are below a seventh of |I1|, and up to half
+  of it for favourable angles;
+- all current transformers of one end reversed: power flows into the section at both ends, or
+  out of it at both. Only where the section can be fed from one side alone.
+
+It does not see: currents below ``least_a``; labels wrong at both ends alike, or currents alone
+wrong by whole rotations; a reversal of all currents in a closed loop or beside generation; one
+reversed transformer in a current that is itself very unbalanced. And a point whose phases carry
+power in opposite directions is to it the same as one reversed transformer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.points import Terminal
+from ..model.symmetrical import A
+from .evidence import Phasors, reversed_terminals
+from .superimpose import negative_sequence, positive_sequence, zero_sequence
+
+__all__ = ["Alarm", "Limits", "fed_one_way", "wiring_alarm"]
+
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+
+class Alarm(IntEnum):
+    """What is doubted, in the order in which it is told."""
+
+    NONE = 0
+    PHASE_ORDER = 1
+    ENDS_APART = 2
+    ONE_CURRENT = 3
+    ALL_CURRENTS = 4
+
+    @property
+    def text(self) -> str:
+        """The doubt in a reader's words."""
+        return _TEXT[self]
+
+
+_TEXT = {
+    Alarm.NONE: "none",
+    Alarm.PHASE_ORDER: "voltages in the wrong phase order: |V2| above |V1|",
+    Alarm.ENDS_APART: "V1 of the two ends far apart: labels rotated?",
+    Alarm.ONE_CURRENT: "one current reversed: |I2| and |I0| above |I1|",
+    Alarm.ALL_CURRENTS: "all currents of one end reversed: no power passes the section",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """From where on the wiring is doubted.
+
+    Parameters
+    ----------
+    live_pu : float
+        Voltages are judged while every phase of the end (of both ends, to compare them) is
+        above: a feeder in service is, with an open phase or an earth fault it need not be.
+    apart_pu : float
+        How far V1 of the two ends may lie apart, per unit of the larger: 29° or half its size.
+        A section drops a tenth at most; a rotation makes 1.73.
+    least_a : float
+        Positive-sequence current, for the direction of power its active part, below which
+        currents are not judged: twenty times the error floor of 0.05 A of the contract.
+    turned : float
+        Share of I1 that I2 and I0 may have once the suspected current is turned round.
+    """
+
+    live_pu: float = 0.8
+    apart_pu: float = 0.5
+    least_a: float = 1.0
+    turned: float = 0.5
+
+
+LIMITS = Limits()
+
+
+def wiring_alarm(
+    phasors: Phasors,
+    terminals: tuple[Terminal, ...],
+    v_nominal_v: float,
+    one_way: Flags | None = None,
+    limits: Limits = LIMITS,
+) -> NDArray[np.int8]:
+    """An Alarm for every terminal and scenario, (T, S), from the frame before the event.
+
+    Parameters
+    ----------
+    phasors : Phasors
+    terminals : tuple of Terminal
+    v_nominal_v : float
+        Nominal phase voltage.
+    one_way : (T,) bool array, optional
+        Sections that are fed from one side alone, whichever (``fed_one_way``): only there must
+        power that flows in at one end flow out at the other. By default none.
+    limits : Limits, optional
+
+    Raises
+    ------
+    ValueError
+        ``one_way`` names a terminal whose other direction is not among ``terminals``.
+    """
+    v, i = phasors.v[0], phasors.i[0]
+    live = (np.abs(v) >= limits.live_pu * v_nominal_v).all(axis=1)
+    v1, i1 = positive_sequence(v), positive_sequence(i)
+    disordered = live & (np.abs(negative_sequence(v)) > np.abs(v1))
+    one_reversed = _one_reversed(i, i1, limits)
+    active = (i1 * v1.conj()).real / v_nominal_v
+    far = reversed_terminals(terminals)
+    if one_way is not None and (one_way & (far < 0)).any():
+        raise ValueError("one_way wants both directions of its sections among the terminals")
+    alarm = np.zeros((len(terminals), v.shape[-1]), np.int8)
+    for t, terminal in enumerate(terminals):
+        ends = [terminal.local_point, terminal.remote_point]
+        # the last assignment wins: what is told first is written last
+        if one_way is not None and one_way[t]:
+            inward = active[ends] * [[terminal.into], [terminals[far[t]].into]]
+            both = (inward >= limits.least_a).all(axis=0) | (inward <= -limits.least_a).all(axis=0)
+            alarm[t, both] = Alarm.ALL_CURRENTS
+        alarm[t, one_reversed[ends].any(axis=0)] = Alarm.ONE_CURRENT
+        gap = np.abs(v1[ends[0]] - v1[ends[1]])
+        apart = gap > limits.apart_pu * np.abs(v1[ends]).max(axis=0)
+        alarm[t, apart & live[ends].all(axis=0)] = Alarm.ENDS_APART
+        alarm[t, disordered[ends].any(axis=0)] = Alarm.PHASE_ORDER
+    return alarm
+
+
+def fed_one_way(terminals: tuple[Terminal, ...]) -> Flags:
+    """(T,) sections of which just one end is a load side; of a feeder without generation."""
+    far = reversed_terminals(terminals)
+    load_side = np.array([terminal.load_side for terminal in terminals], np.bool_)
+    return np.asarray((far >= 0) & (load_side != load_side[far]))
+
+
+def _one_reversed(i: Complex, i1: Complex, limits: Limits) -> Flags:
+    """(P, S): the current of one phase is turned round."""
+    i2, i0 = negative_sequence(i), zero_sequence(i)
+    size = np.abs(i1)
+    suspect = (np.abs(i2) > size) & (np.abs(i0) > size)
+    found = np.zeros(i1.shape, np.bool_)
+    if not suspect.any():
+        return found
+    i1, i2, i0 = i1[suspect], i2[suspect], i0[suspect]
+    by_phase = i.transpose(0, 2, 1)[suspect].T
+    for k, own in enumerate(by_phase):
+        part = 2.0 * own / 3.0
+        size = np.abs(i1 - A**k * part)
+        rest = np.maximum(np.abs(i2 - A ** (-k) * part), np.abs(i0 - part))
+        found[suspect] |= (rest <= limits.turned * size) & (size >= limits.least_a)
+    return found
