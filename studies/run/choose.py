@@ -141,7 +141,8 @@ def choices(case: Case, grid: Grid, training: Training) -> list[tuple[Choice | N
                 trials=int(training.reachable[t]),
                 front=training.front[t],
             )
-            return choose(grid, sample, case.study.certificate.margin, wanted, only_v)
+            answer = choose(grid, sample, case.study.certificate.margin, wanted, only_v)
+            return answer if isinstance(answer, Choice) else None
 
         found.append((best(None), best(int(at_reference_v[0])) if at_reference_v.size else None))
     return found

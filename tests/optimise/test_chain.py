@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from oracles.scalar_detector import as_front, decimals
+from oracles.brute_settings import decimals, numbered
 
 from openphase.optimise.certificate import two_sided, upper_bound
 from openphase.optimise.counts import Grid, corners_of
@@ -80,10 +80,10 @@ def study(seed: int, margin: float) -> Outcome:
         opens=corners_of(GRID, *opens),
         stiff=corners_of(GRID, *stiff),
         trials=OPENS,
-        front=front_of(*false, as_front(false).scenario),
+        front=front_of(*false, numbered(TRIALS)),
     )
     choice = choose(GRID, sample, margin, REFERENCE)
-    assert choice is not None
+    assert isinstance(choice, Choice)
     assert tripped(choice, false) == 0
     assert tripped(choice, opens) == choice.detected
     k = tripped(choice, harmless(rng, TRIALS))

@@ -43,9 +43,10 @@ def case() -> Case:
 def front(*events: tuple[float, float, float, DrawClass, int, int]) -> Front:
     rows = np.array(events, float)
     return Front(
-        di1_a=rows[:, 0],
-        dv1_pu=rows[:, 1],
-        reach_ohm=rows[:, 2],
+        di_a=rows[:, 0],
+        dv_pu=rows[:, 1],
+        z_ohm=rows[:, 2],
+        cap_a=np.zeros(len(rows)),
         scenario=rows[:, 3:].astype(np.int64),
     )
 

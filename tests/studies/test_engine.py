@@ -133,9 +133,9 @@ def test_fronts_are_of_events_that_must_not_trip(
             assert must_not_trip(drawn, known, t)[index].all()
             assert (front.scenario[:, 0] == drawn).all()
             assert (front.scenario[:, 1] == 0).all()
-            np.testing.assert_array_equal(front.di1_a, known.evidence.di1_a[t, index])
-            np.testing.assert_array_equal(front.dv1_pu, known.evidence.dv1_pu[t, index])
-            np.testing.assert_array_equal(front.reach_ohm, reach[t, index])
+            np.testing.assert_array_equal(front.di_a, known.evidence.di1_a[t, index])
+            np.testing.assert_array_equal(front.dv_pu, known.evidence.dv1_pu[t, index])
+            np.testing.assert_array_equal(front.z_ohm, reach[t, index])
 
 
 def test_load_side_terminals_contribute_nothing(
