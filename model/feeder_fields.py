@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from . import feeder_refused as refused
 from .fields import Field
 
-__all__ = ["DOCUMENT", "FORMAT", "TABLES"]
+__all__ = ["CSV_TABLES", "DOCUMENT", "FORMAT", "ROWS", "TABLES"]
 
 FORMAT = 1
 """Version of the file format, the only one there is."""
@@ -19,10 +22,19 @@ DOCUMENT: tuple[Field, ...] = (
         doc="Version of this format.",
     ),
     Field(name="name", kind="name", required=True, doc="The feeder's name, without `/` or `\\`."),
+    Field(
+        name="imported_from",
+        kind="text",
+        doc="What the file was made from; the values it gives then count as imported.",
+    ),
+    Field(name="tables", kind="table", default={}, doc="Tables that stand in CSV files."),
     Field(name="source", kind="table", required=True, doc="The utility source."),
-    Field(name="lines", kind="tables", required=True, doc="Lines; with switches they make buses."),
+    Field(name="lines", kind="tables", required=True, doc="Lines; their ends make the buses."),
     Field(name="transformers", kind="tables", default=(), doc="Distribution transformers."),
     Field(name="loads", kind="tables", default=(), doc="Loads."),
+    Field(name="ders", kind="tables", default=(), doc="Distributed generation."),
+    Field(name="capacitors", kind="tables", default=(), doc="Capacitor banks."),
+    Field(name="regulators", kind="tables", default=(), doc="Voltage regulators."),
     Field(name="switches", kind="tables", default=(), doc="Switches; an open one is a tie."),
     Field(name="points", kind="tables", default=(), doc="Measuring points."),
     Field(name="sections", kind="tables", default=(), doc="Pairs of points that exchange phasors."),
@@ -33,6 +45,24 @@ _LINE = Field(name="line", kind="name", doc="The line it leaves at a tee.")
 _AT = Field(
     name="at", kind="number", low=0.0, high=1.0, doc="The tee's fraction of `line` from its `from`."
 )
+
+_TRANSFORMER = Field(
+    name="transformer",
+    kind="name",
+    doc="The transformer it hangs on; or give a place, `bus` or `line` and `at`.",
+)
+_POWER_FACTOR = Field(
+    name="power_factor",
+    kind="number",
+    low=-1.0,
+    high=1.0,
+    not_zero=True,
+    default=1.0,
+    doc="Power factor, negative for leading.",
+)
+
+CSV_TABLES = ("lines", "transformers", "loads", "ders", "capacitors", "switches", "points")
+"""The tables that may stand in a CSV file: long ones, whose values fit into cells."""
 
 SOURCE: tuple[Field, ...] = (
     Field(name="bus", kind="name", required=True, doc="The substation bus."),
@@ -74,6 +104,29 @@ SOURCE: tuple[Field, ...] = (
         default=60.0,
         doc="Nominal frequency.",
     ),
+    Field(
+        name="neutral",
+        kind="text",
+        choices=("solid", "resistor", "petersen", "isolated"),
+        refused=refused.NEUTRALS,
+        default="solid",
+        doc="How the neutral is earthed.",
+    ),
+    Field(
+        name="neutral_ohm",
+        kind="impedance",
+        unit="ohm",
+        above=0.0,
+        doc="Between neutral and earth, for `resistor` and `petersen` only.",
+    ),
+    Field(
+        name="wires",
+        kind="integer",
+        low=3,
+        high=4,
+        default=4,
+        doc="3: no neutral goes with the lines, and nothing may be connected to one.",
+    ),
 )
 
 LINES: tuple[Field, ...] = (
@@ -99,6 +152,22 @@ LINES: tuple[Field, ...] = (
         required=True,
         doc="Zero-sequence series impedance.",
     ),
+    Field(
+        name="c1_nf_per_km",
+        kind="number",
+        unit="nF/km",
+        low=0.0,
+        default=0.0,
+        doc="Positive-sequence charging.",
+    ),
+    Field(
+        name="c0_nf_per_km",
+        kind="number",
+        unit="nF/km",
+        low=0.0,
+        default=0.0,
+        doc="Zero-sequence charging, at most `c1_nf_per_km`.",
+    ),
 )
 
 TRANSFORMERS: tuple[Field, ...] = (
@@ -109,8 +178,9 @@ TRANSFORMERS: tuple[Field, ...] = (
     Field(
         name="connection",
         kind="text",
-        choices=("Yg/Yg", "D/Yg", "Yg/D"),
+        choices=("Yg/Yg", "D/Yg", "Yg/D", "Y/D", "D/D", "unknown"),
         respell=(("\N{GREEK CAPITAL LETTER DELTA}", "D"), ("\N{INCREMENT}", "D")),
+        refused=refused.CONNECTIONS,
         required=True,
         doc="Windings, feeder side first; `Δ` may be written for `D`.",
     ),
@@ -120,24 +190,29 @@ TRANSFORMERS: tuple[Field, ...] = (
         kind="impedance",
         unit="pu",
         required=True,
-        doc="Leakage on the rating, both halves together; not 0 for `Yg/D`.",
+        doc="Leakage on the rating, both halves together; 0 for `Yg/Yg` and `D/Yg` only.",
     ),
     Field(
         name="x0_pu",
         kind="number",
         unit="pu",
         above=0.0,
-        doc="Zero-sequence magnetizing reactance of a three-limb core, for `Yg/Yg` only.",
+        absent="none",
+        doc="Zero-sequence magnetizing reactance of a three-limb core, for `Yg/Yg` or `unknown`.",
+    ),
+    Field(
+        name="xm_pu",
+        kind="number",
+        unit="pu",
+        above=0.0,
+        absent="infinite",
+        doc="Magnetizing reactance on the rating, of every sequence.",
     ),
 )
 
 LOADS: tuple[Field, ...] = (
     Field(name="name", kind="name", required=True, doc="The load's name."),
-    Field(
-        name="transformer",
-        kind="name",
-        doc="The transformer it hangs on; or give a place, `bus` or `line` and `at`.",
-    ),
+    _TRANSFORMER,
     _BUS,
     _LINE,
     _AT,
@@ -145,6 +220,7 @@ LOADS: tuple[Field, ...] = (
         name="connection",
         kind="text",
         choices=("wye", "delta"),
+        refused=refused.LOAD_CONNECTIONS,
         default="wye",
         doc="Of a load with a place; behind a transformer its winding decides.",
     ),
@@ -156,15 +232,7 @@ LOADS: tuple[Field, ...] = (
         required=True,
         doc="Three-phase active power at nominal voltage.",
     ),
-    Field(
-        name="power_factor",
-        kind="number",
-        low=-1.0,
-        high=1.0,
-        not_zero=True,
-        default=1.0,
-        doc="Power factor, negative for leading.",
-    ),
+    _POWER_FACTOR,
     Field(
         name="exponent",
         kind="number",
@@ -172,6 +240,122 @@ LOADS: tuple[Field, ...] = (
         high=2.0,
         default=2.0,
         doc="P and Q go with voltage to this power: 2 impedance, 1 current, 0 power.",
+    ),
+    Field(
+        name="motor_share",
+        kind="number",
+        low=0.0,
+        high=1.0,
+        default=0.0,
+        doc="Share of it that motors take.",
+    ),
+    Field(
+        name="motor_y2_y1",
+        kind="number",
+        above=0.0,
+        default=6.0,
+        doc="Negative-sequence admittance of these motors over their nominal positive one.",
+    ),
+)
+
+DERS: tuple[Field, ...] = (
+    Field(name="name", kind="name", required=True, doc="The unit's name."),
+    _TRANSFORMER,
+    _BUS,
+    _LINE,
+    _AT,
+    Field(
+        name="kw",
+        kind="number",
+        unit="kW",
+        low=0.0,
+        required=True,
+        doc="Three-phase active power it delivers before the event.",
+    ),
+    replace(_POWER_FACTOR, doc="Power factor, negative where it takes reactive power."),
+    Field(
+        name="model",
+        kind="text",
+        choices=("thevenin", "constant_current", "constant_power", "generator"),
+        refused=refused.DER_MODELS,
+        required=True,
+        doc="What the event leaves as it was: the EMF, the current, the power, the EMF.",
+    ),
+    Field(
+        name="z1_ohm",
+        kind="impedance",
+        unit="ohm",
+        above=0.0,
+        doc="Behind it the EMF stays; for `thevenin` and `generator` only, which need it.",
+    ),
+    Field(
+        name="z2_ohm",
+        kind="impedance",
+        unit="ohm",
+        above=0.0,
+        absent="no path",
+        doc="Impedance to the negative sequence; a `generator` needs it.",
+    ),
+    Field(
+        name="z0_ohm",
+        kind="impedance",
+        unit="ohm",
+        above=0.0,
+        absent="no path",
+        doc="Impedance to the zero sequence.",
+    ),
+)
+
+CAPACITORS: tuple[Field, ...] = (
+    Field(name="name", kind="name", required=True, doc="The bank's name."),
+    _BUS,
+    _LINE,
+    _AT,
+    Field(
+        name="connection",
+        kind="text",
+        choices=("wye", "delta"),
+        refused=refused.LOAD_CONNECTIONS,
+        default="wye",
+        doc="Grounded wye, or delta.",
+    ),
+    Field(
+        name="kvar",
+        kind="number",
+        unit="kvar",
+        above=0.0,
+        required=True,
+        doc="Three-phase reactive power at nominal voltage.",
+    ),
+)
+
+REGULATORS: tuple[Field, ...] = (
+    Field(name="name", kind="name", required=True, doc="The regulator's name."),
+    Field(name="from", kind="name", required=True, doc="Bus whose voltage it steps."),
+    Field(name="to", kind="name", required=True, doc="Bus that gets the stepped voltage."),
+    Field(
+        name="taps",
+        kind="integers",
+        count=3,
+        default=(0, 0, 0),
+        doc="Tap positions of phases a, b, c; `to` has 1 + tap x `step_pct` / 100 of `from`.",
+    ),
+    Field(
+        name="step_pct",
+        kind="number",
+        unit="%",
+        above=0.0,
+        high=5.0,
+        default=0.625,
+        doc="Voltage of one tap.",
+    ),
+    Field(
+        name="most_taps",
+        kind="integer",
+        low=1,
+        high=100,
+        default=16,
+        doc="Farthest tap position, up and down.",
     ),
 )
 
@@ -184,8 +368,15 @@ SWITCHES: tuple[Field, ...] = (
 
 POINTS: tuple[Field, ...] = (
     Field(name="name", kind="name", required=True, doc="The point's name."),
-    Field(name="bus", kind="name", required=True, doc="Where it measures V: an end of `line`."),
-    Field(name="line", kind="name", required=True, doc="Where it measures I, at that end."),
+    Field(name="bus", kind="name", required=True, doc="The end of `line` that it stands at."),
+    Field(name="line", kind="name", required=True, doc="The line whose current it measures there."),
+    Field(
+        name="voltage_side",
+        kind="text",
+        choices=("line", "bus"),
+        default="line",
+        doc="Side of its contacts where it measures V, which matters while they are open.",
+    ),
 )
 
 SECTIONS: tuple[Field, ...] = (
@@ -193,13 +384,24 @@ SECTIONS: tuple[Field, ...] = (
     Field(name="remote", kind="name", required=True, doc="Another point, with line between."),
 )
 
-TABLES: dict[str, tuple[Field, ...]] = {
-    "source": SOURCE,
+ROWS: dict[str, tuple[Field, ...]] = {
     "lines": LINES,
     "transformers": TRANSFORMERS,
     "loads": LOADS,
+    "ders": DERS,
+    "capacitors": CAPACITORS,
+    "regulators": REGULATORS,
     "switches": SWITCHES,
     "points": POINTS,
     "sections": SECTIONS,
 }
-"""The fields of each table, in the order in which a file is written."""
+"""The fields of each array of tables, in the order in which a file is written."""
+
+TABLES: dict[str, tuple[Field, ...]] = {
+    "tables": tuple(
+        Field(name=table, kind="name", doc=f"CSV file with the {table}.") for table in CSV_TABLES
+    ),
+    "source": SOURCE,
+    **ROWS,
+}
+"""The fields of each table of a file."""

@@ -338,9 +338,10 @@ def test_many_faults_are_reported_at_once_in_the_order_of_the_file() -> None:
         " got 'BB'",
         "f.toml:36: loads 'L1': kw must be a finite number, kW, >= 0, got true",
         "f.toml:43: loads 'L2': power_factor must be -1 to 1, not 0, got 0",
+        "f.toml:49: switches 'tie': to must be connected with 'SUB' while ties are open, got 'FAR'",
         "f.toml:58: points 'P2': bus must be an end of line 'B', 'B1' or 'B2', got 'SUB'",
         "f.toml:63: sections #1: remote must be a point of the feeder, got 'P3'",
-        "7 faults",
+        "8 faults",
     ]
 
 
