@@ -8,12 +8,14 @@ are open.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from .errors import Report
 from .feeder_document import document_from_feeder, feeder_from_document
 from .feeder_electrical import check_electrical
 from .feeder_graph import check_graph, check_section_paths, graph_is_known
 from .feeder_names import STUB_SUFFIXES, check_ends, check_names, check_references
+from .feeder_tables import with_csv_tables
 from .parts import (
     Capacitor,
     Der,
@@ -75,14 +77,22 @@ def make_feeder(  # noqa: PLR0913 - one argument for each field of Feeder
     return checked_feeder(Report(source=name, document=document))
 
 
-def checked_feeder(report: Report) -> Feeder:
+def checked_feeder(report: Report, folder: Path | None = None) -> Feeder:
     """Return the feeder that the report's document describes.
+
+    Parameters
+    ----------
+    report
+        Holds the document, and receives its faults.
+    folder
+        Where the CSV tables stand that the document names.
 
     Raises
     ------
     InputError
         With every fault of the document, and those that the report held already.
     """
+    report = with_csv_tables(report, folder)
     feeder = feeder_from_document(report.document, report)
     check_names(feeder, report)
     check_references(feeder, report)

@@ -108,7 +108,7 @@ def _check_place(row: _Row, allowed: Sequence[set[str]], path: KeyPath, report: 
 
 def _check_load_connection(raw: Mapping[str, object], path: KeyPath, report: Report) -> None:
     """Report a connection where the winding above the load decides it."""
-    if "transformer" in raw and "connection" in raw:
+    if "transformer" in raw and "connection" in raw and REPORTED not in raw.values():
         rule = "must be left out behind a transformer, whose winding decides"
         report.add((*path, "connection"), rule)
 

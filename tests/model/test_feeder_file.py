@@ -369,9 +369,9 @@ def test_what_a_dump_looks_like() -> None:
 def test_the_documented_fields_are_the_ones_checked(table: str) -> None:
     fields = DOCUMENT if table == "top level" else TABLES[table]
     text = DOC.read_text(encoding="utf-8")
-    heading = {"top level": "### Top level", "source": "### `[source]`"}.get(
-        table, f"### `[[{table}]]`"
-    )
+    headings = {"top level": "### Top level"}
+    headings |= {name: f"### `[{name}]`" for name in ("source", "tables")}
+    heading = headings.get(table, f"### `[[{table}]]`")
     _, _, after = text.partition(f"{heading}\n")
     assert markdown_table(fields) in after.partition("\n#")[0]
 
