@@ -126,7 +126,7 @@ def _fill(
     found: CsvTable,
 ) -> None:
     """Add the rows that the lines below the column names hold; lines without text hold none."""
-    missing = [own.name for own in fields if own.required and not _has(head, own)]
+    absent = [own.name for own in fields if not _is_whole(head, own)]
     for number, line in lines:
         cells = _without_tail(line, len(head))
         if not any(cells):
@@ -134,8 +134,13 @@ def _fill(
         path = (table, len(found.rows))
         found.lines[path] = number
         if len(cells) == len(head):
-            row = _row(head, cells, fields)
-            found.rows.append({**row, **dict.fromkeys(missing, REPORTED)})
+            row = {**_row(head, cells, fields), **dict.fromkeys(absent, REPORTED)}
+            for name, value in row.items():
+                if isinstance(value, dict) and len(value) < len(_POLAR):
+                    rule = f"must have both cells, {name}.mag and {name}.deg, or none"
+                    found.faults.append(((*path, name), rule, None))
+                    row[name] = REPORTED
+            found.rows.append(row)
         else:
             rule = f"must have {len(head)} cells, as many as there are columns"
             found.faults.append((path, rule, str(len(cells))))
@@ -171,7 +176,15 @@ def _unread(found: CsvTable, fields: Sequence[Field]) -> CsvTable:
 
 
 def _has(head: Sequence[str], own: Field) -> bool:
+    """Whether any column speaks of the field, rightly or not."""
     return any(column.partition(".")[0] == own.name for column in head)
+
+
+def _is_whole(head: Sequence[str], own: Field) -> bool:
+    """Whether the field has the columns it needs, or none and may have none."""
+    if _has(head, own):
+        return all(column in head for column in columns_of([own]))
+    return not own.required
 
 
 def _check_head(

@@ -71,7 +71,10 @@ def _check_neutral(source: Source, own: _Checks) -> None:
 def _check_charging(line: Line, index: int, own: _Checks) -> None:
     """No capacitance between phases is negative."""
     if line.c0_nf_per_km > line.c1_nf_per_km:
-        rule = f"must be <= c1_nf_per_km, {line.c1_nf_per_km:g}, which holds the phases' own too"
+        rule = (
+            f"must be <= c1_nf_per_km ({line.c1_nf_per_km:g}),"
+            " or capacitance between phases would be negative"
+        )
         path = ("lines", index, "c0_nf_per_km")
         own.add(path, ("c1_nf_per_km",), rule, f"{line.c0_nf_per_km!r}")
 

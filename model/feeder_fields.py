@@ -218,7 +218,8 @@ ROWS: dict[str, tuple[Field, ...]] = {
 
 TABLES: dict[str, tuple[Field, ...]] = {
     "tables": tuple(
-        Field(name=table, kind="name", doc=f"CSV file that stands for `[[{table}]]`.") for table in CSV_TABLES
+        Field(name=table, kind="name", doc=f"CSV file that stands for `[[{table}]]`.")
+        for table in CSV_TABLES
     ),
     "source": SOURCE,
     **ROWS,

@@ -17,11 +17,11 @@ _PHASES = (
 _CLOCK = r"1?[0-9]?"
 
 CONNECTIONS: _Pairs = (
-    (rf"YNyn{_CLOCK}|Yny[gn]", "a vector group; written feeder side first, YNyn is Yg/Yg"),
-    (rf"Dyn{_CLOCK}", "a vector group; written feeder side first, Dyn is D/Yg"),
-    (rf"YNd{_CLOCK}", "a vector group; written feeder side first, YNd is Yg/D"),
-    (rf"Yd{_CLOCK}", "a vector group; written feeder side first, Yd is Y/D"),
-    (rf"Dd{_CLOCK}", "a vector group; written feeder side first, Dd is D/D"),
+    (rf"YNyn{_CLOCK}|Yny[gn]", "a vector group, written Yg/Yg whatever its clock"),
+    (rf"Dyn{_CLOCK}", "a vector group, written D/Yg whatever its clock"),
+    (rf"YNd{_CLOCK}", "a vector group, written Yg/D whatever its clock"),
+    (rf"Yd{_CLOCK}", "a vector group, written Y/D whatever its clock"),
+    (rf"Dd{_CLOCK}", "a vector group, written D/D whatever its clock"),
     (
         rf"(Y|Yg|D|YN)/?Y{_CLOCK}",
         "a low-voltage wye winding without a grounded neutral, which has no model",
@@ -81,8 +81,12 @@ KEYS: dict[str, _Pairs] = {
         (r"buses|nodes", "buses are made by the lines, switches and regulators that end there"),
         (r"faults?|events?", "events belong into the study file"),
     ),
+    "tables": ((r"regulators|sections|source", "this table stands in the feeder file itself"),),
     "source": (
-        (r"scc.*|mva.*|short_circuit.*", "give z1_ohm, kv_ll squared over the short-circuit MVA"),
+        (
+            r"scc.*|mva.*|short_circuit.*",
+            "given by z1_ohm: kv_ll squared over the short-circuit MVA",
+        ),
     ),
     "lines": (
         _PHASES,

@@ -29,7 +29,7 @@ def with_csv_tables(report: Report, folder: Path | None) -> Report:
     named = report.document.get("tables")
     if not isinstance(named, Mapping):
         return report
-    names = check_table(named, TABLES["tables"], ("tables",), report)
+    names = check_table(named, TABLES["tables"], ("tables",), report, KEYS["tables"])
     document = dict(report.document)
     elsewhere = dict(report.elsewhere)
     read: list[CsvTable] = []
@@ -40,7 +40,7 @@ def with_csv_tables(report: Report, folder: Path | None) -> Report:
             report.add(path, rule, repr(names[table]))
             continue
         file = _inside(names[table], folder, path, report)
-        text = None if file is None else _text(file, path, report)
+        text = None if file is None else _text(file, names[table], path, report)
         if file is None or text is None:
             document[table] = [{own.name: REPORTED for own in ROWS[table]}]
             continue
@@ -77,17 +77,17 @@ def _inside(name: str, folder: Path | None, path: KeyPath, report: Report) -> Pa
     return file
 
 
-def _text(file: Path, path: KeyPath, report: Report) -> str | None:
+def _text(file: Path, name: str, path: KeyPath, report: Report) -> str | None:
     """Return the text of a file; report one that cannot be read."""
     if file.exists() and not file.is_file():
-        report.add(path, "must be a file to read", f"{file.name!r}, which is none")
+        report.add(path, "must name a file", repr(name))
         return None
     try:
         return read_text(file)
     except InputError as error:
-        fault = error.faults[0]
-        reason = f": {fault.found}" if fault.found else ""
-        report.add(path, f"{fault.wanted}{reason}", repr(file.name))
+        reason = error.faults[0].found
+        rule = "a file of UTF-8 text" if reason is None else f"a file to read: {reason}"
+        report.add(path, f"must name {rule}", repr(name))
         return None
 
 

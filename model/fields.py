@@ -109,9 +109,12 @@ def did_you_mean(found: str, known: Iterable[str]) -> str:
     --------
     >>> did_you_mean("lenght_km", ["name", "length_km"])
     " (did you mean 'length_km'?)"
+    >>> did_you_mean("kW", ["name", "kw"])
+    " (did you mean 'kw'?)"
     """
-    near = get_close_matches(found, list(known), n=1)
-    return f" (did you mean {near[0]!r}?)" if near else ""
+    spelled = {name.lower(): name for name in known}
+    near = get_close_matches(found.lower(), list(spelled), n=1)
+    return f" (did you mean {spelled[near[0]]!r}?)" if near else ""
 
 
 _KIND_WORDS: dict[Kind, str] = {

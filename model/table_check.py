@@ -17,7 +17,12 @@ REPORTED: Final = object()
 
 
 class _UnfitError(Exception):
-    """A value breaks the rule that the message states."""
+    """A value breaks a rule; ``what`` says what it is, if it is known but has no model."""
+
+    def __init__(self, rule: str, what: str = "") -> None:
+        super().__init__(rule)
+        self.rule = rule
+        self.what = what
 
 
 def check_table(
@@ -59,8 +64,10 @@ def check_table(
         elif field.name in table:
             try:
                 values[field.name] = _READERS[field.kind](table[field.name], field)
-            except _UnfitError as rule:
-                report.add((*path, field.name), str(rule), as_toml(table[field.name]))
+            except _UnfitError as error:
+                what = f": {error.what}" if error.what else ""
+                found = f"{as_toml(table[field.name])}{what}"
+                report.add((*path, field.name), error.rule, found)
                 values[field.name] = _stand_in(field)
         elif field.required:
             if raw is not None:
@@ -116,9 +123,9 @@ def _read_text(value: object, field: Field) -> str:
     for variant, standard in field.respell:
         value = value.replace(variant, standard)
     if field.choices and value not in field.choices:
-        why = reason(value, field.refused)
-        hint = f": {why}" if why else did_you_mean(value, field.choices)
-        raise _UnfitError(f"must be {describe_field(field)}{hint}")
+        what = reason(value, field.refused)
+        hint = "" if what else did_you_mean(value, field.choices)
+        raise _UnfitError(f"must be {describe_field(field)}{hint}", what)
     return value
 
 
