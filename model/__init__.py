@@ -15,9 +15,24 @@ from .feeder_file import (
     read_feeder,
     shipped_feeders,
 )
-from .parts import Feeder, Line, Load, Place, Point, Section, Source, Switch, Transformer
+from .parts import (
+    Capacitor,
+    Der,
+    Feeder,
+    Line,
+    Load,
+    Place,
+    Point,
+    Regulator,
+    Section,
+    Source,
+    Switch,
+    Transformer,
+)
 
 __all__ = [
+    "Capacitor",
+    "Der",
     "Feeder",
     "InputError",
     "Line",
@@ -25,6 +40,7 @@ __all__ = [
     "OpenPhaseError",
     "Place",
     "Point",
+    "Regulator",
     "Section",
     "Source",
     "Switch",

@@ -108,6 +108,8 @@ class Report:
         The document as nested tables; names in it make the messages readable.
     locate
         Gives the line of a key path.
+    elsewhere
+        Source and locator of those tables of the document that stand in files of their own.
     faults, paths
         What was found so far, and the key path of each fault.
     """
@@ -115,16 +117,19 @@ class Report:
     source: str
     document: Mapping[str, object]
     locate: Locator = _unknown_line
+    elsewhere: Mapping[str, tuple[str, Locator]] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
     paths: list[KeyPath] = field(default_factory=list)
 
     def add(self, path: KeyPath, wanted: str, found: str | None = None) -> None:
         """Note that the value at ``path`` breaks the rule ``wanted``."""
+        own = (self.source, self.locate)
+        source, locate = self.elsewhere.get(str(path[0]), own) if path else own
         self.paths.append(path)
         self.faults.append(
             Fault(
-                source=self.source,
-                line=self.locate(path),
+                source=source,
+                line=locate(path),
                 where=describe_path(path, self.document),
                 wanted=wanted,
                 found=found,
@@ -132,7 +137,7 @@ class Report:
         )
 
     def raise_if_any(self) -> None:
-        """Raise the faults in the order of their lines; those without a line come last.
+        """Raise the faults file by file in the order of their lines, those without one last.
 
         Raises
         ------
@@ -140,7 +145,10 @@ class Report:
             If there is any fault.
         """
         if self.faults:
-            raise InputError(sorted(self.faults, key=lambda f: (f.line is None, f.line or 0)))
+            files = [self.source, *(source for source, _ in self.elsewhere.values())]
+            order = [(files.index(f.source), f.line is None, f.line or 0) for f in self.faults]
+            ranked = sorted(range(len(order)), key=order.__getitem__)
+            raise InputError(self.faults[n] for n in ranked)
 
 
 def describe_path(path: KeyPath, document: Mapping[str, object]) -> str:

@@ -10,15 +10,54 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .errors import KeyPath, Report
-from .feeder_fields import DOCUMENT, FORMAT, TABLES
-from .parts import Feeder, Line, Load, Place, Point, Section, Source, Switch, Transformer
-from .table_check import check_table
+from .feeder_fields import DOCUMENT, FORMAT, ROWS, TABLES
+from .feeder_refused import KEYS
+from .fields import Field
+from .parts import (
+    Capacitor,
+    Der,
+    Feeder,
+    Line,
+    Load,
+    Place,
+    Point,
+    Regulator,
+    Section,
+    Source,
+    Switch,
+    Transformer,
+)
+from .provenance import find_origins, is_written, row_key
+from .table_check import REPORTED, check_table
 
 __all__ = ["document_from_feeder", "feeder_from_document"]
 
 _Row = dict[str, Any]
 
+_PARTS: dict[str, type] = {
+    "lines": Line,
+    "transformers": Transformer,
+    "loads": Load,
+    "ders": Der,
+    "capacitors": Capacitor,
+    "regulators": Regulator,
+    "switches": Switch,
+    "points": Point,
+    "sections": Section,
+}
+
+_RENAMED = {"from": "from_bus", "to": "to_bus"}
+"""Fields of a file whose name is a word of Python's."""
+
 _PLACES = ({"bus"}, {"line", "at"})
+
+_HANGING = {
+    "transformers": _PLACES,
+    "loads": ({"transformer"}, *_PLACES),
+    "ders": ({"transformer"}, *_PLACES),
+    "capacitors": _PLACES,
+}
+"""The ways in which the parts of a table may say where they hang."""
 
 
 def feeder_from_document(document: Mapping[str, object], report: Report) -> Feeder:
@@ -28,30 +67,34 @@ def feeder_from_document(document: Mapping[str, object], report: Report) -> Feed
     of a faulty name, so the feeder is of use only to further checks until the report is
     known to be empty.
     """
-    top = check_table(document, DOCUMENT, (), report)
-    source = check_table(top["source"], TABLES["source"], ("source",), report)
-    rows = {table: _rows(top[table], table, report) for table in TABLES if table != "source"}
-    for index, row in enumerate(rows["transformers"]):
-        _check_place(row, _PLACES, ("transformers", index), report)
-    for index, (raw, row) in enumerate(zip(top["loads"], rows["loads"], strict=True)):
-        _check_place(row, ({"transformer"}, *_PLACES), ("loads", index), report)
+    top = check_table(document, DOCUMENT, (), report, KEYS[""])
+    source = check_table(top["source"], TABLES["source"], ("source",), report, KEYS["source"])
+    rows = {table: _rows(top[table], table, report) for table in ROWS}
+    for table, ways in _HANGING.items():
+        for index, (raw, row) in enumerate(zip(top[table], rows[table], strict=True)):
+            if REPORTED not in raw.values():
+                _check_place(row, ways, (table, index), report)
+    for index, raw in enumerate(top["loads"]):
         _check_load_connection(raw, ("loads", index), report)
+    origins = find_origins(
+        {"source": [top["source"] or {}], **{table: top[table] for table in ROWS}},
+        {"source": [source], **rows},
+        imported=top["imported_from"] is not None,
+    )
     return Feeder(
         name=top["name"],
-        source=Source(**source),
-        lines=tuple(_line(row) for row in rows["lines"]),
-        transformers=tuple(_transformer(row) for row in rows["transformers"]),
-        loads=tuple(_load(row) for row in rows["loads"]),
-        switches=tuple(_switch(row) for row in rows["switches"]),
-        points=tuple(Point(**row) for row in rows["points"]),
-        sections=tuple(Section(**row) for row in rows["sections"]),
+        source=_source(source),
+        **{table: tuple(_part(table, row) for row in rows[table]) for table in ROWS},
+        imported_from=top["imported_from"],
+        origins=origins,
     )
 
 
 def _rows(raw: Sequence[Mapping[str, object]], table: str, report: Report) -> list[_Row]:
     """Return the checked rows of an array of tables."""
     return [
-        check_table(row, TABLES[table], (table, index), report) for index, row in enumerate(raw)
+        check_table(row, ROWS[table], (table, index), report, KEYS[table])
+        for index, row in enumerate(raw)
     ]
 
 
@@ -65,131 +108,64 @@ def _check_place(row: _Row, allowed: Sequence[set[str]], path: KeyPath, report: 
 
 def _check_load_connection(raw: Mapping[str, object], path: KeyPath, report: Report) -> None:
     """Report a connection where the winding above the load decides it."""
-    if "transformer" in raw and "connection" in raw:
+    if "transformer" in raw and "connection" in raw and REPORTED not in raw.values():
         rule = "must be left out behind a transformer, whose winding decides"
         report.add((*path, "connection"), rule)
 
 
-def _line(row: _Row) -> Line:
-    return Line(
-        name=row["name"],
-        from_bus=row["from"],
-        to_bus=row["to"],
-        length_km=row["length_km"],
-        z1_ohm_per_km=row["z1_ohm_per_km"],
-        z0_ohm_per_km=row["z0_ohm_per_km"],
-    )
+def _source(row: _Row) -> Source:
+    return Source(**{**row, "neutral_ohm": row["neutral_ohm"] or 0j})
 
 
-def _place(row: _Row) -> Place:
-    return Place(bus=row["bus"], line=row["line"], at=row["at"])
-
-
-def _transformer(row: _Row) -> Transformer:
-    return Transformer(
-        name=row["name"],
-        place=_place(row),
-        connection=row["connection"],
-        rating_kva=row["rating_kva"],
-        leakage_pu=row["leakage_pu"],
-        x0_pu=row["x0_pu"],
-    )
-
-
-def _load(row: _Row) -> Load:
-    return Load(
-        name=row["name"],
-        transformer=row["transformer"],
-        place=_place(row) if row["transformer"] is None else None,
-        connection=row["connection"],
-        kw=row["kw"],
-        power_factor=row["power_factor"],
-        exponent=row["exponent"],
-    )
-
-
-def _switch(row: _Row) -> Switch:
-    return Switch(name=row["name"], from_bus=row["from"], to_bus=row["to"], closed=row["closed"])
+def _part(table: str, row: _Row) -> Any:
+    """Return the part that a row describes; its attributes are called like the fields."""
+    values = {_RENAMED.get(key, key): value for key, value in row.items()}
+    if "at" in values:
+        place = Place(bus=values.pop("bus"), line=values.pop("line"), at=values.pop("at"))
+        values["place"] = place if values.get("transformer") is None else None
+    return _PARTS[table](**values)
 
 
 def document_from_feeder(feeder: Feeder) -> dict[str, object]:
-    """Return the document that describes a feeder, with every default written out."""
+    """Return the document that describes a feeder.
+
+    A value that is the default is written only where the feeder's origins say that it was
+    given: so a default stays one when the document is read.
+    """
+    document: dict[str, object] = {"format": FORMAT, "name": feeder.name}
+    if feeder.imported_from is not None:
+        document["imported_from"] = feeder.imported_from
+    document["source"] = _row(feeder, "source", 0, feeder.source)
+    for table in ROWS:
+        parts = getattr(feeder, table)
+        document[table] = [_row(feeder, table, index, part) for index, part in enumerate(parts)]
+    return document
+
+
+def _row(feeder: Feeder, table: str, index: int, part: object) -> _Row:
+    """Return the row that describes a part."""
+    values = {field.name: _value(part, field) for field in TABLES[table]}
+    key = row_key(values, index)
     return {
-        "format": FORMAT,
-        "name": feeder.name,
-        "source": _source_row(feeder.source),
-        "lines": [_line_row(line) for line in feeder.lines],
-        "transformers": [_transformer_row(unit) for unit in feeder.transformers],
-        "loads": [_load_row(load) for load in feeder.loads],
-        "switches": [_switch_row(switch) for switch in feeder.switches],
-        "points": [{"name": p.name, "bus": p.bus, "line": p.line} for p in feeder.points],
-        "sections": [{"local": s.local, "remote": s.remote} for s in feeder.sections],
+        field.name: _plain(values[field.name])
+        for field in TABLES[table]
+        if is_written(field, values, feeder.origins.get((table, key, field.name)))
     }
 
 
-def _source_row(source: Source) -> _Row:
-    return {
-        "bus": source.bus,
-        "kv_ll": source.kv_ll,
-        "emf_pu": source.emf_pu,
-        "z1_ohm": _rectangular(source.z1_ohm),
-        "z2_ohm": _rectangular(source.z2_ohm),
-        "z0_ohm": _rectangular(source.z0_ohm),
-        "frequency_hz": source.frequency_hz,
-    }
+def _value(part: object, field: Field) -> object:
+    """Return the value that a part has in a field; None where it has none."""
+    name = _RENAMED.get(field.name, field.name)
+    if name == "neutral_ohm":
+        return getattr(part, name) or None
+    if hasattr(part, name):
+        return getattr(part, name)
+    place = getattr(part, "place", None)
+    return None if place is None else getattr(place, name)
 
 
-def _line_row(line: Line) -> _Row:
-    return {
-        "name": line.name,
-        "from": line.from_bus,
-        "to": line.to_bus,
-        "length_km": line.length_km,
-        "z1_ohm_per_km": _rectangular(line.z1_ohm_per_km),
-        "z0_ohm_per_km": _rectangular(line.z0_ohm_per_km),
-    }
-
-
-def _transformer_row(unit: Transformer) -> _Row:
-    row = {
-        "name": unit.name,
-        **_place_row(unit.place),
-        "connection": unit.connection,
-        "rating_kva": unit.rating_kva,
-        "leakage_pu": _rectangular(unit.leakage_pu),
-    }
-    return row if unit.x0_pu is None else {**row, "x0_pu": unit.x0_pu}
-
-
-def _load_row(load: Load) -> _Row:
-    row: _Row = {"name": load.name, **_place_row(load.place)}
-    if load.transformer is not None:
-        row["transformer"] = load.transformer
-    if load.transformer is None or load.connection != "wye":
-        row["connection"] = load.connection
-    return {
-        **row,
-        "kw": load.kw,
-        "power_factor": load.power_factor,
-        "exponent": load.exponent,
-    }
-
-
-def _switch_row(switch: Switch) -> _Row:
-    return {
-        "name": switch.name,
-        "from": switch.from_bus,
-        "to": switch.to_bus,
-        "closed": switch.closed,
-    }
-
-
-def _place_row(place: Place | None) -> _Row:
-    if place is None:
-        return {}
-    row = {"bus": place.bus, "line": place.line, "at": place.at}
-    return {key: value for key, value in row.items() if value is not None}
-
-
-def _rectangular(z: complex) -> list[float]:
-    return [z.real, z.imag]
+def _plain(value: object) -> object:
+    """Return a value as a file holds it: impedances and tuples are lists there."""
+    if isinstance(value, complex):
+        return [value.real, value.imag]
+    return list(value) if isinstance(value, tuple) else value

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from . import feeder_refused as refused
 from .fields import Field
+from .shunt_fields import CAPACITORS, DERS, LOADS, TRANSFORMERS
 
-__all__ = ["DOCUMENT", "FORMAT", "TABLES"]
+__all__ = ["CSV_TABLES", "DOCUMENT", "FORMAT", "ROWS", "TABLES"]
 
 FORMAT = 1
 """Version of the file format, the only one there is."""
@@ -19,20 +21,26 @@ DOCUMENT: tuple[Field, ...] = (
         doc="Version of this format.",
     ),
     Field(name="name", kind="name", required=True, doc="The feeder's name, without `/` or `\\`."),
+    Field(
+        name="imported_from",
+        kind="text",
+        doc="What the file was made from; the values it gives then count as imported.",
+    ),
+    Field(name="tables", kind="table", default={}, doc="Tables that stand in CSV files."),
     Field(name="source", kind="table", required=True, doc="The utility source."),
-    Field(name="lines", kind="tables", required=True, doc="Lines; with switches they make buses."),
+    Field(name="lines", kind="tables", required=True, doc="Lines; their ends make the buses."),
     Field(name="transformers", kind="tables", default=(), doc="Distribution transformers."),
     Field(name="loads", kind="tables", default=(), doc="Loads."),
+    Field(name="ders", kind="tables", default=(), doc="Distributed generation."),
+    Field(name="capacitors", kind="tables", default=(), doc="Capacitor banks."),
+    Field(name="regulators", kind="tables", default=(), doc="Voltage regulators."),
     Field(name="switches", kind="tables", default=(), doc="Switches; an open one is a tie."),
     Field(name="points", kind="tables", default=(), doc="Measuring points."),
     Field(name="sections", kind="tables", default=(), doc="Pairs of points that exchange phasors."),
 )
 
-_BUS = Field(name="bus", kind="name", doc="The bus it stands at; or give `line` and `at`.")
-_LINE = Field(name="line", kind="name", doc="The line it leaves at a tee.")
-_AT = Field(
-    name="at", kind="number", low=0.0, high=1.0, doc="The tee's fraction of `line` from its `from`."
-)
+CSV_TABLES = ("lines", "transformers", "loads", "ders", "capacitors", "switches", "points")
+"""The tables that may stand in a CSV file: long ones, whose values fit into cells."""
 
 SOURCE: tuple[Field, ...] = (
     Field(name="bus", kind="name", required=True, doc="The substation bus."),
@@ -74,6 +82,29 @@ SOURCE: tuple[Field, ...] = (
         default=60.0,
         doc="Nominal frequency.",
     ),
+    Field(
+        name="neutral",
+        kind="text",
+        choices=("solid", "resistor", "petersen", "isolated"),
+        refused=refused.NEUTRALS,
+        default="solid",
+        doc="How the neutral is earthed.",
+    ),
+    Field(
+        name="neutral_ohm",
+        kind="impedance",
+        unit="ohm",
+        above=0.0,
+        doc="Between neutral and earth, for `resistor` and `petersen` only.",
+    ),
+    Field(
+        name="wires",
+        kind="integer",
+        low=3,
+        high=4,
+        default=4,
+        doc="3: no neutral goes with the lines, and nothing may be connected to one.",
+    ),
 )
 
 LINES: tuple[Field, ...] = (
@@ -99,79 +130,51 @@ LINES: tuple[Field, ...] = (
         required=True,
         doc="Zero-sequence series impedance.",
     ),
+    Field(
+        name="c1_nf_per_km",
+        kind="number",
+        unit="nF/km",
+        low=0.0,
+        default=0.0,
+        doc="Positive-sequence charging.",
+    ),
+    Field(
+        name="c0_nf_per_km",
+        kind="number",
+        unit="nF/km",
+        low=0.0,
+        default=0.0,
+        doc="Zero-sequence charging, at most `c1_nf_per_km`.",
+    ),
 )
 
-TRANSFORMERS: tuple[Field, ...] = (
-    Field(name="name", kind="name", required=True, doc="Name that its loads refer to."),
-    _BUS,
-    _LINE,
-    _AT,
+REGULATORS: tuple[Field, ...] = (
+    Field(name="name", kind="name", required=True, doc="The regulator's name."),
+    Field(name="from", kind="name", required=True, doc="Bus whose voltage it steps."),
+    Field(name="to", kind="name", required=True, doc="Bus that gets the stepped voltage."),
     Field(
-        name="connection",
-        kind="text",
-        choices=("Yg/Yg", "D/Yg", "Yg/D"),
-        respell=(("\N{GREEK CAPITAL LETTER DELTA}", "D"), ("\N{INCREMENT}", "D")),
-        required=True,
-        doc="Windings, feeder side first; `Δ` may be written for `D`.",
-    ),
-    Field(name="rating_kva", kind="number", unit="kVA", above=0.0, required=True, doc="Rating."),
-    Field(
-        name="leakage_pu",
-        kind="impedance",
-        unit="pu",
-        required=True,
-        doc="Leakage on the rating, both halves together; not 0 for `Yg/D`.",
+        name="taps",
+        kind="integers",
+        count=3,
+        default=(0, 0, 0),
+        doc="Tap positions of phases a, b, c; `to` has 1 + tap x `step_pct` / 100 of `from`.",
     ),
     Field(
-        name="x0_pu",
+        name="step_pct",
         kind="number",
-        unit="pu",
+        unit="%",
         above=0.0,
-        doc="Zero-sequence magnetizing reactance of a three-limb core, for `Yg/Yg` only.",
-    ),
-)
-
-LOADS: tuple[Field, ...] = (
-    Field(name="name", kind="name", required=True, doc="The load's name."),
-    Field(
-        name="transformer",
-        kind="name",
-        doc="The transformer it hangs on; or give a place, `bus` or `line` and `at`.",
-    ),
-    _BUS,
-    _LINE,
-    _AT,
-    Field(
-        name="connection",
-        kind="text",
-        choices=("wye", "delta"),
-        default="wye",
-        doc="Of a load with a place; behind a transformer its winding decides.",
+        high=5.0,
+        default=0.625,
+        doc="Voltage of one tap.",
     ),
     Field(
-        name="kw",
-        kind="number",
-        unit="kW",
-        low=0.0,
-        required=True,
-        doc="Three-phase active power at nominal voltage.",
-    ),
-    Field(
-        name="power_factor",
-        kind="number",
-        low=-1.0,
-        high=1.0,
-        not_zero=True,
-        default=1.0,
-        doc="Power factor, negative for leading.",
-    ),
-    Field(
-        name="exponent",
-        kind="number",
-        low=0.0,
-        high=2.0,
-        default=2.0,
-        doc="P and Q go with voltage to this power: 2 impedance, 1 current, 0 power.",
+        name="most_taps",
+        kind="integer",
+        low=1,
+        high=100,
+        default=16,
+        doc="Farthest tap position, up and down.",
     ),
 )
 
@@ -184,8 +187,15 @@ SWITCHES: tuple[Field, ...] = (
 
 POINTS: tuple[Field, ...] = (
     Field(name="name", kind="name", required=True, doc="The point's name."),
-    Field(name="bus", kind="name", required=True, doc="Where it measures V: an end of `line`."),
-    Field(name="line", kind="name", required=True, doc="Where it measures I, at that end."),
+    Field(name="bus", kind="name", required=True, doc="The end of `line` that it stands at."),
+    Field(name="line", kind="name", required=True, doc="The line whose current it measures there."),
+    Field(
+        name="voltage_side",
+        kind="text",
+        choices=("line", "bus"),
+        default="line",
+        doc="Side of its contacts where it measures V, which matters while they are open.",
+    ),
 )
 
 SECTIONS: tuple[Field, ...] = (
@@ -193,13 +203,25 @@ SECTIONS: tuple[Field, ...] = (
     Field(name="remote", kind="name", required=True, doc="Another point, with line between."),
 )
 
-TABLES: dict[str, tuple[Field, ...]] = {
-    "source": SOURCE,
+ROWS: dict[str, tuple[Field, ...]] = {
     "lines": LINES,
     "transformers": TRANSFORMERS,
     "loads": LOADS,
+    "ders": DERS,
+    "capacitors": CAPACITORS,
+    "regulators": REGULATORS,
     "switches": SWITCHES,
     "points": POINTS,
     "sections": SECTIONS,
 }
-"""The fields of each table, in the order in which a file is written."""
+"""The fields of each array of tables, in the order in which a file is written."""
+
+TABLES: dict[str, tuple[Field, ...]] = {
+    "tables": tuple(
+        Field(name=table, kind="name", doc=f"CSV file that stands for `[[{table}]]`.")
+        for table in CSV_TABLES
+    ),
+    "source": SOURCE,
+    **ROWS,
+}
+"""The fields of each table of a file."""

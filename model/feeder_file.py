@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -12,7 +13,14 @@ from .fields import did_you_mean
 from .parts import Feeder
 from .toml_file import parse_toml, read_text, toml_rows
 
-__all__ = ["dump_feeder", "feeder_from_toml", "load_feeder", "read_feeder", "shipped_feeders"]
+__all__ = [
+    "dump_feeder",
+    "feeder_content",
+    "feeder_from_toml",
+    "load_feeder",
+    "read_feeder",
+    "shipped_feeders",
+]
 
 _DATA = resources.files(__name__.rpartition(".")[0]) / "data"
 
@@ -25,18 +33,27 @@ def read_feeder(path: Path) -> Feeder:
     InputError
         If the file cannot be read, or with every fault of what it says.
     """
-    return feeder_from_toml(read_text(path), str(path))
+    return feeder_from_toml(read_text(path), str(path), path.parent)
 
 
-def feeder_from_toml(text: str, source_name: str) -> Feeder:
-    """Return the feeder that a TOML text describes; ``source_name`` begins each message.
+def feeder_from_toml(text: str, source_name: str, folder: Path | None = None) -> Feeder:
+    """Return the feeder that a TOML text describes.
+
+    Parameters
+    ----------
+    text
+        The feeder file's text.
+    source_name
+        Begins each message.
+    folder
+        Where the CSV tables stand that the text may name; None: it may name none.
 
     Raises
     ------
     InputError
         With every fault of the text.
     """
-    return checked_feeder(parse_toml(text, source_name))
+    return checked_feeder(parse_toml(text, source_name), folder)
 
 
 def load_feeder(name_or_path: str) -> Feeder:
@@ -77,7 +94,7 @@ def shipped_feeders() -> tuple[str, ...]:
 
 
 def dump_feeder(feeder: Feeder) -> str:
-    """Return the text of a feeder file that reads back as exactly this feeder."""
+    """Return the text of a feeder file that reads back as exactly this feeder, origins included."""
     document = document_from_feeder(feeder)
     blocks: list[str] = []
     top = {key: value for key, value in document.items() if not isinstance(value, (dict, list))}
@@ -88,3 +105,11 @@ def dump_feeder(feeder: Feeder) -> str:
         elif isinstance(value, list):
             blocks.extend(f"[[{table}]]\n{toml_rows(row)}" for row in value)
     return "\n".join(blocks)
+
+
+def feeder_content(feeder: Feeder) -> str:
+    """Return a text that is the same for equal feeders, wherever their values come from.
+
+    That is what a hash should be taken of: a default counts the same when it is written out.
+    """
+    return dump_feeder(replace(feeder, imported_from=None, origins={}))

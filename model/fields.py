@@ -22,7 +22,17 @@ __all__ = [
 ]
 
 Kind = Literal[
-    "name", "text", "number", "integer", "flag", "impedance", "range", "numbers", "table", "tables"
+    "name",
+    "text",
+    "number",
+    "integer",
+    "flag",
+    "impedance",
+    "range",
+    "numbers",
+    "integers",
+    "table",
+    "tables",
 ]
 
 
@@ -42,7 +52,7 @@ class Field:
         - ``number``: finite, an integer will do; ``integer``; ``flag``: true or false;
         - ``impedance``: ``[r, x]`` or ``{ mag, deg }``, bounds are on the magnitude and
           the resistance is never negative;
-        - ``range``: ``[low, high]``; ``numbers``: a list; bounds are on each number;
+        - ``range``: ``[low, high]``; ``numbers``, ``integers``: a list; bounds are on each;
         - ``table``, ``tables``: one table, an array of tables; not checked any deeper.
     doc
         One sentence for the documentation.
@@ -58,12 +68,20 @@ class Field:
         The only texts allowed, if any.
     respell
         Pairs ``(variant, standard)``, replaced inside a text before it is checked.
+    refused
+        Pairs ``(pattern, why)`` of texts that have a meaning, but one that the model cannot
+        represent: a text that the whole pattern fits is refused with the reason.
+    count
+        How many numbers a list must hold, if that is fixed.
     required
         The key must be there.
     default
         Value of an absent key; None where absence itself means something.
     same_as
         An absent key takes the value of this other one, which stands before it.
+    absent
+        What it means that an optional key without default is absent, where that is an
+        assumption about the feeder.
     """
 
     name: str
@@ -76,9 +94,12 @@ class Field:
     not_zero: bool = False
     choices: tuple[str, ...] = ()
     respell: tuple[tuple[str, str], ...] = ()
+    refused: tuple[tuple[str, str], ...] = ()
+    count: int | None = None
     required: bool = False
     default: object = None
     same_as: str = ""
+    absent: str = ""
 
 
 def did_you_mean(found: str, known: Iterable[str]) -> str:
@@ -88,9 +109,12 @@ def did_you_mean(found: str, known: Iterable[str]) -> str:
     --------
     >>> did_you_mean("lenght_km", ["name", "length_km"])
     " (did you mean 'length_km'?)"
+    >>> did_you_mean("kW", ["name", "kw"])
+    " (did you mean 'kw'?)"
     """
-    near = get_close_matches(found, list(known), n=1)
-    return f" (did you mean {near[0]!r}?)" if near else ""
+    spelled = {name.lower(): name for name in known}
+    near = get_close_matches(found.lower(), list(spelled), n=1)
+    return f" (did you mean {spelled[near[0]]!r}?)" if near else ""
 
 
 _KIND_WORDS: dict[Kind, str] = {
@@ -102,6 +126,7 @@ _KIND_WORDS: dict[Kind, str] = {
     "impedance": "[r, x] or { mag = ..., deg = ... }",
     "range": "[low, high]",
     "numbers": "a list of finite numbers",
+    "integers": "a list of integers",
     "table": "a table",
     "tables": "an array of tables",
 }
@@ -132,7 +157,10 @@ def describe_field(field: Field) -> str:
     """Return what the field takes, such as ``a finite number, km, > 0``."""
     if field.choices:
         return _choices(field)
-    return ", ".join(filter(None, (_KIND_WORDS[field.kind], field.unit, bounds_of(field))))
+    words = _KIND_WORDS[field.kind]
+    if field.count is not None:
+        words = words.replace("a list of", f"a list of {field.count}")
+    return ", ".join(filter(None, (words, field.unit, bounds_of(field))))
 
 
 def as_toml(value: object) -> str:
@@ -174,5 +202,5 @@ def _markdown_row(field: Field) -> list[str]:
     elif field.same_as:
         default = f"as `{field.same_as}`"
     else:
-        default = "–" if field.default is None else f"`{as_toml(field.default)}`"
+        default = (field.absent or "–") if field.default is None else f"`{as_toml(field.default)}`"
     return [f"`{field.name}`", field.kind, field.unit or "–", bounds or "–", default, field.doc]

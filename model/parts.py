@@ -7,7 +7,8 @@ the fraction counted from the line's from-end.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 __all__ = [
@@ -21,6 +22,8 @@ __all__ = [
     "Load",
     "LoadConnection",
     "Neutral",
+    "Origin",
+    "OriginKey",
     "Place",
     "Point",
     "Regulator",
@@ -37,6 +40,12 @@ CapacitorConnection = Literal["wye", "delta"]
 DerModel = Literal["thevenin", "constant_current", "constant_power", "generator"]
 VoltageSide = Literal["line", "bus"]
 Neutral = Literal["solid", "resistor", "petersen", "isolated"]
+
+Origin = Literal["given", "imported", "default", "unknown"]
+"""Where a value comes from: the file, another file it was made from, a default, or nowhere."""
+
+OriginKey = tuple[str, str | int, str]
+"""Table, the row's name (its index where rows have none), field: ``("loads", "L1", "kw")``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,7 +223,11 @@ class Section:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Feeder:
-    """A checked feeder; build it with ``feeder_file.read_feeder`` or ``feeder.make_feeder``."""
+    """A checked feeder; build it with ``feeder_file.read_feeder`` or ``feeder.make_feeder``.
+
+    ``origins`` tells where each value comes from, and ``imported_from`` the file it was made
+    from, if any; feeders that differ in these alone are equal.
+    """
 
     name: str
     source: Source
@@ -227,3 +240,5 @@ class Feeder:
     ders: tuple[Der, ...] = ()
     capacitors: tuple[Capacitor, ...] = ()
     regulators: tuple[Regulator, ...] = ()
+    imported_from: str | None = field(default=None, compare=False)
+    origins: Mapping[OriginKey, Origin] = field(default_factory=dict, compare=False, repr=False)

@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from .errors import KeyPath, Report
 from .fields import Field, Kind, as_toml, bounds_of, describe_field, did_you_mean
 
-__all__ = ["check_table"]
+__all__ = ["REPORTED", "check_table", "reason"]
+
+REPORTED: Final = object()
+"""Stands in a table for a value whose fault has been reported where it was read."""
 
 
 class _UnfitError(Exception):
-    """A value breaks the rule that the message states."""
+    """A value breaks a rule; ``what`` says what it is, if it is known but has no model."""
+
+    def __init__(self, rule: str, what: str = "") -> None:
+        super().__init__(rule)
+        self.rule = rule
+        self.what = what
 
 
 def check_table(
-    raw: Mapping[str, object] | None, fields: Sequence[Field], path: KeyPath, report: Report
+    raw: Mapping[str, object] | None,
+    fields: Sequence[Field],
+    path: KeyPath,
+    report: Report,
+    refused: Sequence[tuple[str, str]] = (),
 ) -> dict[str, Any]:
     """Return the values of one table, every field of it, and report all that is wrong.
 
@@ -31,6 +44,9 @@ def check_table(
         Where the table stands in the document.
     report
         Receives the faults.
+    refused
+        Pairs ``(pattern, why)`` of keys that have a meaning, but one that the model cannot
+        represent; the reason becomes part of the message.
 
     Returns
     -------
@@ -40,14 +56,18 @@ def check_table(
         the report has faults, the values serve for nothing else.
     """
     table = {} if raw is None else raw
-    _report_unknown_keys(table, fields, path, report)
+    _report_unknown_keys(table, fields, path, report, refused)
     values: dict[str, Any] = {}
     for field in fields:
-        if field.name in table:
+        if field.name in table and table[field.name] is REPORTED:
+            values[field.name] = _stand_in(field)
+        elif field.name in table:
             try:
                 values[field.name] = _READERS[field.kind](table[field.name], field)
-            except _UnfitError as rule:
-                report.add((*path, field.name), str(rule), as_toml(table[field.name]))
+            except _UnfitError as error:
+                what = f": {error.what}" if error.what else ""
+                found = f"{as_toml(table[field.name])}{what}"
+                report.add((*path, field.name), error.rule, found)
                 values[field.name] = _stand_in(field)
         elif field.required:
             if raw is not None:
@@ -59,13 +79,31 @@ def check_table(
 
 
 def _report_unknown_keys(
-    raw: Mapping[str, object], fields: Sequence[Field], path: KeyPath, report: Report
+    raw: Mapping[str, object],
+    fields: Sequence[Field],
+    path: KeyPath,
+    report: Report,
+    refused: Sequence[tuple[str, str]],
 ) -> None:
-    """Report every key that no field describes, with the nearest that one does."""
+    """Report every key that no field describes: why, or else the nearest that one does."""
     known = [field.name for field in fields]
     for key in raw:
         if key not in known:
-            report.add((*path, key), f"is not a known key{did_you_mean(key, known)}")
+            why = reason(key, refused)
+            hint = f": {why}" if why else did_you_mean(key, known)
+            report.add((*path, key), f"is not a known key{hint}")
+
+
+def reason(text: str, refused: Sequence[tuple[str, str]]) -> str:
+    """Return why ``text`` is refused, by the first pattern that fits it all; or nothing.
+
+    Examples
+    --------
+    >>> reason("Kva", [("kva|kvar", "say it by kw")])
+    'say it by kw'
+    """
+    fitting = (why for pattern, why in refused if re.fullmatch(pattern, text, re.IGNORECASE))
+    return next(fitting, "")
 
 
 # ---- one reader per kind: the value as Python has it, or _UnfitError with the rule ----
@@ -85,7 +123,9 @@ def _read_text(value: object, field: Field) -> str:
     for variant, standard in field.respell:
         value = value.replace(variant, standard)
     if field.choices and value not in field.choices:
-        raise _UnfitError(f"must be {describe_field(field)}{did_you_mean(value, field.choices)}")
+        what = reason(value, field.refused)
+        hint = "" if what else did_you_mean(value, field.choices)
+        raise _UnfitError(f"must be {describe_field(field)}{hint}", what)
     return value
 
 
@@ -137,6 +177,16 @@ def _read_numbers(value: object, field: Field) -> tuple[float, ...]:
     return numbers
 
 
+def _read_integers(value: object, field: Field) -> tuple[int, ...]:
+    found = value if isinstance(value, list) else [None]
+    integers = tuple(item for item in found if type(item) is int)
+    if len(integers) < len(found) or field.count not in (None, len(found)):
+        raise _UnfitError(f"must be {describe_field(field)}")
+    for number in integers:
+        _check_bounds(number, field, "hold integers ")
+    return integers
+
+
 def _read_table(value: object, field: Field) -> Mapping[str, object]:
     if not isinstance(value, Mapping):
         raise _UnfitError(f"must be a table, written [{field.name}]")
@@ -160,6 +210,7 @@ _READERS: dict[Kind, Callable[[object, Field], object]] = {
     "impedance": _read_impedance,
     "range": _read_range,
     "numbers": _read_numbers,
+    "integers": _read_integers,
     "table": _read_table,
     "tables": _read_tables,
 }
@@ -173,12 +224,15 @@ _STAND_INS: dict[Kind, object] = {
     "impedance": 1.0 + 0.0j,
     "range": (0.0, 1.0),
     "numbers": (),
+    "integers": (),
     "table": None,
     "tables": (),
 }
 
 
 def _stand_in(field: Field) -> object:
+    if field.kind == "integers" and field.count is not None:
+        return (0,) * field.count
     return field.choices[0] if field.choices else _STAND_INS[field.kind]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import textwrap
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -12,9 +14,10 @@ import numpy as np
 
 from ..model.errors import InputError, OpenPhaseError
 from ..model.feeder_file import load_feeder
-from ..model.network import Network, compile_network
-from ..model.parts import Feeder
+from ..model.network import Network, assumed_connection, compile_network
+from ..model.parts import Der, Feeder, Load, Place, Regulator, Switch
 from ..model.points import Terminal, find_points
+from ..model.provenance import assumptions, count_origins
 from .run.spec import Study, check_study, default_study
 from .run.store import as_json
 from .show.sheet import PAGE, wrapped
@@ -22,6 +25,7 @@ from .show.sheet import PAGE, wrapped
 __all__ = ["check_command", "summary"]
 
 LONG_LIST = 16  #: columns in which a list of names may run on below itself
+INSIDE = ("units", "ders", "capacitors", "regulators", "switches")  #: listed as inside a section
 
 
 def check_command(args: argparse.Namespace) -> int:
@@ -39,16 +43,26 @@ def check_command(args: argparse.Namespace) -> int:
 def summary(feeder: Feeder, study: Study) -> dict[str, Any]:
     """What ``check --json`` prints."""
     network = compile_network(feeder)
-    load_kw = sum(load.kw for load in feeder.loads)
+    source = feeder.source
     found: dict[str, Any] = {
         "feeder": feeder.name,
-        "kv_ll": feeder.source.kv_ll,
+        "imported_from": feeder.imported_from,
+        "kv_ll": source.kv_ll,
+        "wires": source.wires,
+        "neutral": source.neutral,
+        "neutral_ohm": [source.neutral_ohm.real, source.neutral_ohm.imag],
         "line_km": float(network.length_km.sum()),
-        "load_kw": load_kw,
+        "load_kw": sum(load.kw for load in feeder.loads),
         "points": [point.name for point in feeder.points],
         "sections": [],
         "loop": [switch.name for switch in feeder.switches if not switch.closed],
-        "assumed": _assumed(feeder),
+        "ders": [{"name": d.name, "kw": d.kw, "model": d.model} for d in feeder.ders],
+        "capacitors": [
+            {"name": c.name, "kvar": c.kvar, "connection": c.connection} for c in feeder.capacitors
+        ],
+        "regulators": [{"name": r.name, "taps": list(r.taps)} for r in feeder.regulators],
+        "values": count_origins(feeder),
+        "assumed": [*_assumed(feeder), *assumptions(feeder)],
     }
     if feeder.sections:
         points = find_points(feeder, network)
@@ -59,45 +73,75 @@ def summary(feeder: Feeder, study: Study) -> dict[str, Any]:
 
 def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study) -> dict[str, Any]:
     """One section: its line, what hangs in it and beyond it."""
-    inside_nodes = _nodes(network, terminal)
-    beyond_all = _kw_below(feeder, network, terminal, nearest=True)
-    beyond_far = _kw_below(feeder, network, terminal, nearest=False)
-    low = study.loads.level[0] * study.loads.each[0]
-    high = study.loads.level[1] * study.loads.each[1]
-    units = [
-        name
-        for name, node in zip(network.units, network.tree.unit_node, strict=True)
-        if node in inside_nodes
-    ]
-    given = {t.name: t.connection for t in feeder.transformers}
+    inside = _inside(feeder, network, terminal)
+    near = _kw_below(feeder, network, terminal, nearest=True)
+    far = _kw_below(feeder, network, terminal, nearest=False)
+    level, each = study.loads.level.support, study.loads.each.support
+    units = [unit for unit in feeder.transformers if inside.holds(unit.place)]
+    behind = {unit.name for unit in units}
+
+    def hanging(parts: Iterable[Load | Der]) -> list[str]:
+        return [p.name for p in parts if p.transformer in behind or inside.holds(p.place)]
+
     return {
         "local": terminal.local,
         "remote": terminal.remote,
         "length_km": float(network.length_km[terminal.on_path].sum()),
         "line_z1_ohm": [terminal.line_z1_ohm.real, terminal.line_z1_ohm.imag],
-        "downstream_kw": [beyond_far * low, beyond_all * high],
-        "downstream_kw_nominal": [beyond_far, beyond_all],
-        "units": units,
-        "yg_d": [name for name in units if given.get(name) == "Yg/D"],
-        "yg_d_sampled": [name for name in units if name in study.transformers.yg_d],
-        "regulators": 0,
-        "switches": [
-            s.name for s in feeder.switches if s.closed and _within(s, inside_nodes, network)
-        ],
+        "downstream_kw": [far * level[0] * each[0], near * level[1] * each[1]],
+        "downstream_kw_nominal": [far, near],
+        "units": [unit.name for unit in units],
+        "yg_d": [unit.name for unit in units if unit.connection == "Yg/D"],
+        "yg_d_sampled": [unit.name for unit in units if unit.name in study.transformers.yg_d],
+        "yg_d_unknown": [unit.name for unit in units if unit.connection == "unknown"],
+        "loads": hanging(feeder.loads),
+        "ders": hanging(feeder.ders),
+        "capacitors": [bank.name for bank in feeder.capacitors if inside.holds(bank.place)],
+        "regulators": [part.name for part in feeder.regulators if inside.joins(part)],
+        "switches": [part.name for part in feeder.switches if part.closed and inside.joins(part)],
     }
 
 
-def _within(switch: Any, nodes: set[int], network: Network) -> bool:
-    return {network.node(switch.from_bus), network.node(switch.to_bus)} <= nodes
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Inside:
+    """The lines and buses inside a section: the path, and laterals up to the next point."""
+
+    lines: frozenset[str]
+    buses: frozenset[str]
+    ends: Mapping[str, tuple[str, str]]
+
+    def holds(self, place: Place | None) -> bool:
+        if place is None:
+            return False
+        if place.bus is not None:
+            return place.bus in self.buses
+        assert place.line is not None
+        if place.at in (0.0, 1.0):
+            return self.ends[place.line][int(place.at)] in self.buses
+        return place.line in self.lines
+
+    def joins(self, part: Switch | Regulator) -> bool:
+        return {part.from_bus, part.to_bus} <= self.buses
 
 
-def _nodes(network: Network, terminal: Terminal) -> set[int]:
-    """Nodes at the lower ends of the section's edges."""
-    return {int(k) for k in np.flatnonzero(terminal.in_section) if k < len(network.nodes)}
+def _inside(feeder: Feeder, network: Network, terminal: Terminal) -> _Inside:
+    """Find what is inside; a bus is outside if a point measures what flows from it inwards."""
+    pieces = [network.pieces[k] for k in np.flatnonzero(terminal.in_section)]
+    ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
+    path = {p.line for k in np.flatnonzero(terminal.on_path) if (p := network.pieces[k])}
+    lines = frozenset(p.line for p in pieces if p and p.line)
+    outer = {
+        p.bus
+        for p in feeder.points
+        if p.line in lines and (p.name in (terminal.local, terminal.remote) or p.line not in path)
+    }
+    touched = {bus for name in lines for bus in ends[name]}
+    touched |= {bus for p in pieces if p and not p.line for bus in p.ends}
+    return _Inside(lines=lines, buses=frozenset(touched - outer), ends=ends)
 
 
 def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: bool) -> float:
-    """Nominal kW beyond the section's first edge, or beyond its last."""
+    """Nominal kW of load beyond the section's first edge, or beyond its last."""
     path = [int(k) for k in np.flatnonzero(terminal.on_path)]
     edge = min(path) if nearest else max(path)
     loaded = network.below(edge)[network.tree.unit_node[network.tree.load_unit]]
@@ -105,11 +149,16 @@ def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: 
 
 
 def _assumed(feeder: Feeder) -> list[str]:
-    """What this version takes for granted about any feeder."""
+    """What the model takes for granted about any feeder."""
     said = [
-        "lines are transposed, without charging; loads are balanced over three phases",
+        "lines are transposed; loads, DER and capacitors are balanced over three phases",
         "downstream kW: nominal times the study's load range, at the section's far and near end",
     ]
+    if any(unit.connection == "unknown" for unit in feeder.transformers):
+        said.append(
+            "transformers of unknown connection are drawn by a study; until then they count as "
+            f"{assumed_connection(feeder.source)}"
+        )
     if any(line.z0_ohm_per_km == line.z1_ohm_per_km for line in feeder.lines):
         said.append("some lines have z0 = z1 (given so): overhead lines have z0 ≈ 3 z1")
     return said
@@ -132,14 +181,15 @@ def _text(found: dict[str, Any]) -> str:
     """The summary for people, in 100 columns."""
     lines = [
         *wrapped(
-            f"{found['feeder']}: no faults; {found['kv_ll']:g} kV, {found['line_km']:g} km of "
-            f"line, {found['load_kw']:g} kW, {len(found['points'])} measuring points"
+            f"{found['feeder']}: no faults; {found['kv_ll']:g} kV, {found['wires']} wires, "
+            f"neutral {found['neutral']}, {found['line_km']:g} km of line, "
+            f"{found['load_kw']:g} kW, {len(found['points'])} measuring points"
         ),
         "",
         *(_sections(found["sections"]) or ["no sections: nothing to size"]),
         "",
-        *wrapped(f"ties, normally open: {', '.join(found['loop']) or 'none'}"),
-        "regulators: none",
+        *_elements(found),
+        *wrapped(_values(found)),
         "assumed:",
     ]
     for text in found["assumed"]:
@@ -147,11 +197,43 @@ def _text(found: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _elements(found: dict[str, Any]) -> list[str]:
+    """What stands on the feeder beside lines, loads and transformers, and in which section."""
+    parts = {
+        "ties, normally open": found["loop"],
+        "DER": [f"{d['name']} ({d['kw']:g} kW, {d['model']})" for d in found["ders"]],
+        "capacitors": [
+            f"{c['name']} ({c['kvar']:g} kvar, {c['connection']})" for c in found["capacitors"]
+        ],
+        "regulators": [
+            f"{r['name']} (taps {', '.join(f'{tap:+d}' if tap else '0' for tap in r['taps'])})"
+            for r in found["regulators"]
+        ],
+    }
+    lines = []
+    for what, names in parts.items():
+        lines += wrapped(f"{what}: {', '.join(names) or 'none'}")
+    for row in found["sections"]:
+        if row["regulators"]:
+            lines += wrapped(
+                f"note: inside {row['local']}–{row['remote']} the taps of "
+                f"{', '.join(row['regulators'])} may change, which looks like an open phase"
+            )
+    return lines
+
+
+def _values(found: dict[str, Any]) -> str:
+    """How many values come from where."""
+    counts = ", ".join(f"{count} {origin}" for origin, count in found["values"].items() if count)
+    source = found["imported_from"]
+    return f"values: {counts}{f' (from {source})' if source else ''}"
+
+
 def _sections(rows: list[dict[str, Any]]) -> list[str]:
-    """The table of the sections; none where there is no section."""
+    """The table of the sections; none where there is no section. NAME?: connection unknown."""
     if not rows:
         return []
-    cells = [["section", "km", "|Z1| Ω", "downstream kW", "Yg/D known", "Yg/D sampled", "inside"]]
+    cells = [["section", "km", "|Z1| Ω", "downstream kW", "Yg/D known", "Yg/D possible", "inside"]]
     for row in rows:
         low, high = row["downstream_kw"]
         cells.append(
@@ -160,8 +242,9 @@ def _sections(rows: list[dict[str, Any]]) -> list[str]:
                 f"{row['length_km']:g}",
                 f"{abs(complex(*row['line_z1_ohm'])):.3f}",
                 f"{low:.0f} .. {high:.0f}",
-                *(", ".join(row[key]) or "-" for key in ("yg_d", "yg_d_sampled")),
-                ", ".join(row["units"] + row["switches"]) or "-",
+                ", ".join(row["yg_d"]) or "-",
+                ", ".join([*row["yg_d_sampled"], *(f"{n}?" for n in row["yg_d_unknown"])]) or "-",
+                ", ".join(name for kind in INSIDE for name in row[kind]) or "-",
             ]
         )
     wide = [max(len(line[n]) for line in cells) for n in range(7)]

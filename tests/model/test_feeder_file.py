@@ -338,9 +338,10 @@ def test_many_faults_are_reported_at_once_in_the_order_of_the_file() -> None:
         " got 'BB'",
         "f.toml:36: loads 'L1': kw must be a finite number, kW, >= 0, got true",
         "f.toml:43: loads 'L2': power_factor must be -1 to 1, not 0, got 0",
+        "f.toml:49: switches 'tie': to must be connected with 'SUB' while ties are open, got 'FAR'",
         "f.toml:58: points 'P2': bus must be an end of line 'B', 'B1' or 'B2', got 'SUB'",
         "f.toml:63: sections #1: remote must be a point of the feeder, got 'P3'",
-        "7 faults",
+        "8 faults",
     ]
 
 
@@ -368,9 +369,9 @@ def test_what_a_dump_looks_like() -> None:
 def test_the_documented_fields_are_the_ones_checked(table: str) -> None:
     fields = DOCUMENT if table == "top level" else TABLES[table]
     text = DOC.read_text(encoding="utf-8")
-    heading = {"top level": "### Top level", "source": "### `[source]`"}.get(
-        table, f"### `[[{table}]]`"
-    )
+    headings = {"top level": "### Top level"}
+    headings |= {name: f"### `[{name}]`" for name in ("source", "tables")}
+    heading = headings.get(table, f"### `[[{table}]]`")
     _, _, after = text.partition(f"{heading}\n")
     assert markdown_table(fields) in after.partition("\n#")[0]
 
