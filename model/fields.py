@@ -22,7 +22,20 @@ __all__ = [
 ]
 
 Kind = Literal[
-    "name", "text", "number", "integer", "flag", "impedance", "range", "numbers", "table", "tables"
+    "name",
+    "text",
+    "number",
+    "integer",
+    "flag",
+    "impedance",
+    "range",
+    "numbers",
+    "table",
+    "tables",
+    "distribution",
+    "whole",
+    "choice",
+    "names",
 ]
 
 
@@ -43,7 +56,9 @@ class Field:
         - ``impedance``: ``[r, x]`` or ``{ mag, deg }``, bounds are on the magnitude and
           the resistance is never negative;
         - ``range``: ``[low, high]``; ``numbers``: a list; bounds are on each number;
-        - ``table``, ``tables``: one table, an array of tables; not checked any deeper.
+        - ``table``, ``tables``: one table, an array of tables; not checked any deeper;
+        - ``distribution``, ``whole`` (of whole numbers), ``choice`` (of texts), ``names``:
+          what a study file has besides, checked there.
     doc
         One sentence for the documentation.
     unit
@@ -104,6 +119,10 @@ _KIND_WORDS: dict[Kind, str] = {
     "numbers": "a list of finite numbers",
     "table": "a table",
     "tables": "an array of tables",
+    "distribution": "a number, [low, high] or a distribution",
+    "whole": "a whole number, [least, most] or a distribution of whole numbers",
+    "choice": "a text, a list of texts or { values = [...], weights = [...] }",
+    "names": "a list of names",
 }
 
 
