@@ -1,0 +1,326 @@
+"""Equations and unknowns of the dense reference, and how they are solved.
+
+A circuit is a list of linear equations in SI units with a scale for every row and column,
+and *groups*: branches between terminals whose admittance depends on their own voltage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import zgecon, zgetrf, zgetrs
+
+__all__ = [
+    "FLOOR_PU",
+    "FORTESCUE",
+    "Circuit",
+    "Complex",
+    "Floats",
+    "Found",
+    "Group",
+    "NotConvergedError",
+    "Terminal",
+    "machine_matrix",
+    "solve_circuit",
+]
+
+Complex = NDArray[np.complex128]
+Floats = NDArray[np.float64]
+Terminal = tuple[str, int] | None
+"""A node and its phase, or None: earth."""
+
+FLOOR_PU = 0.7
+"""Voltage below which what depends on it is a constant impedance."""
+TOLERANCE = 1e-13
+MAX_ITERATIONS = 1000
+NULL_TOLERANCE = 1e-11
+"""Singular values below this share of the largest count as zero."""
+WELL_CONDITIONED = 1e-10
+"""Reciprocal condition from which a matrix has no null space to look for."""
+
+A = np.exp(2j * np.pi / 3)
+FORTESCUE: Complex = np.array([[1, 1, 1], [1, A**2, A], [1, A, A**2]], dtype=np.complex128)
+"""Phase from sequence quantities, in the order 0, 1, 2."""
+
+
+class NotConvergedError(RuntimeError):
+    """No state was found in which voltages and what depends on them agree."""
+
+
+def machine_matrix(y0: complex, y1: complex, y2: complex) -> Complex:
+    """Admittance between three windings' voltages and currents, from that of each sequence."""
+    return np.asarray(FORTESCUE @ np.diag([y0, y1, y2]) @ FORTESCUE.conj().T / 3)
+
+
+@dataclass(slots=True, kw_only=True)
+class Group:
+    """Branches whose nominal admittance is multiplied by max(|V|, floor)**(exponent - 2).
+
+    Each branch by its own voltage; those of a machine all by their positive sequence.
+    """
+
+    plus: list[Terminal]
+    minus: list[Terminal]
+    v_nominal: float
+    y_s: Complex  #: (n, n) at nominal voltage, varies
+    exponent: float
+    machine: bool = False
+    fixed_s: Complex | float = 0.0  #: (n, n) besides
+    fed_a: Complex | float = 0.0  #: (n,) current fed in, whatever the voltage
+
+    def magnitudes(self, v: Complex) -> Floats:
+        """(n,) the voltages that count, pu."""
+        if self.machine:
+            return np.full(3, abs(FORTESCUE[:, 1].conj() @ v) / 3 / self.v_nominal)
+        return np.asarray(np.abs(v) / self.v_nominal, dtype=np.float64)
+
+    def varying(self, pu: Floats) -> Complex:
+        """(n, n) voltage-dependent part of the admittance."""
+        factor = np.maximum(pu, FLOOR_PU) ** (self.exponent - 2.0)
+        return np.asarray(self.y_s * factor[:, None], dtype=np.complex128)
+
+
+@dataclass(slots=True)
+class Circuit:
+    """Equations and unknowns in SI; scales bring them to per unit before solving."""
+
+    s_base: float
+    column_scale: list[float] = field(default_factory=list)
+    row_scale: list[float] = field(default_factory=list)
+    entries: list[tuple[int, int, complex]] = field(default_factory=list)
+    rhs: dict[int, complex] = field(default_factory=dict)
+    nodes: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """First of the three voltage columns and of the three current-balance rows."""
+    groups: dict[str, Group] = field(default_factory=dict)
+    losses: list[tuple[Complex, list[int]]] = field(default_factory=list)
+    charging: list[tuple[str, Complex]] = field(default_factory=list)
+
+    def columns(self, count: int, scale: float) -> list[int]:
+        start = len(self.column_scale)
+        self.column_scale += [scale] * count
+        return list(range(start, start + count))
+
+    def row(self, scale: float, terms: Sequence[tuple[int, complex]], rhs: complex = 0) -> int:
+        index = len(self.row_scale)
+        self.row_scale.append(scale)
+        self.entries += [(index, column, value) for column, value in terms]
+        self.rhs[index] = rhs
+        return index
+
+    def node(self, name: str, v_base: float) -> str:
+        if name in self.nodes:
+            raise ValueError(f"two nodes are called {name!r}")
+        column = self.columns(3, v_base)[0]
+        first, _, _ = (self.row(self.s_base / v_base, []) for _ in range(3))
+        self.nodes[name] = (column, first)
+        return name
+
+    def voltage(self, terminal: Terminal, sign: complex) -> list[tuple[int, complex]]:
+        """Term ``sign * V`` of an equation; nothing for earth."""
+        if terminal is None:
+            return []
+        return [(self.nodes[terminal[0]][0] + terminal[1], sign)]
+
+    def leaves(self, terminal: Terminal, column: int, sign: complex) -> None:
+        """Add ``sign`` times a current unknown to the balance of currents leaving a node."""
+        if terminal is not None:
+            self.entries.append((self.nodes[terminal[0]][1] + terminal[1], column, sign))
+
+    def shunt(self, node: str, y: Complex) -> None:
+        """A constant coupled admittance from the three phases of a node to earth."""
+        column, row = self.nodes[node]
+        self.entries += [
+            (row + k, column + j, complex(y[k, j])) for k in range(3) for j in range(3) if y[k, j]
+        ]
+        self.charging.append((node, y))
+
+    def series(self, a: str, b: str, z: Complex, v_base: float) -> list[int]:
+        """Coupled conductors from node a to node b; the currents flow from a to b."""
+        current = self.columns(3, self.s_base / v_base)
+        for k in range(3):
+            self.leaves((a, k), current[k], 1)
+            self.leaves((b, k), current[k], -1)
+            drop = [(current[j], complex(-z[k, j])) for j in range(3)]
+            self.row(v_base, self.voltage((a, k), 1) + self.voltage((b, k), -1) + drop)
+        self.losses.append((z, current))
+        return current
+
+    def gap(self, a: str, b: str, open_phases: Sequence[int], v_base: float) -> list[int]:
+        """Ideal conductors from a to b, those of ``open_phases`` interrupted."""
+        current = self.columns(3, self.s_base / v_base)
+        for k in range(3):
+            self.leaves((a, k), current[k], 1)
+            self.leaves((b, k), current[k], -1)
+            if k in open_phases:
+                self.row(self.s_base / v_base, [(current[k], 1)])
+            else:
+                self.row(v_base, self.voltage((a, k), 1) + self.voltage((b, k), -1))
+        return current
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """A solved circuit: unknowns in SI, voltages across all branches, what is undetermined."""
+
+    x: Complex
+    across: dict[str, Complex]  #: by group, volts
+    pu: dict[str, Floats]  #: by group, the voltages that count
+    drawn_a: dict[str, Complex]  #: by group, amperes from plus to minus
+    null: Complex  #: (unknowns, n)
+    iterations: int
+
+
+@dataclass(slots=True)
+class _Matrices:
+    """The circuit in per unit: ``(fixed + into @ Y @ across) x = rhs + into @ fed``."""
+
+    fixed: Complex
+    rhs: Complex
+    into: Complex
+    across: Complex
+
+
+def _matrices(circuit: Circuit) -> _Matrices:
+    size = len(circuit.column_scale)
+    if len(circuit.row_scale) != size:
+        raise AssertionError("the circuit has not as many equations as unknowns")
+    columns = np.array(circuit.column_scale)
+    rows = np.array(circuit.row_scale)
+    fixed = np.zeros((size, size), dtype=np.complex128)
+    for r, c, value in circuit.entries:
+        fixed[r, c] += value
+    rhs = np.zeros(size, dtype=np.complex128)
+    for r, value in circuit.rhs.items():
+        rhs[r] = value
+    pairs = [
+        pair
+        for group in circuit.groups.values()
+        for pair in zip(group.plus, group.minus, strict=True)
+    ]
+    into = np.zeros((size, len(pairs)), dtype=np.complex128)
+    across = np.zeros((len(pairs), size), dtype=np.complex128)
+    for b, (plus, minus) in enumerate(pairs):
+        for terminal, sign in ((plus, 1.0), (minus, -1.0)):
+            if terminal is not None:
+                column, row = circuit.nodes[terminal[0]]
+                across[b, column + terminal[1]] += sign
+                into[row + terminal[1], b] += sign
+    return _Matrices(
+        fixed * columns / rows[:, None], rhs / rows, into / rows[:, None], across * columns
+    )
+
+
+def _null_spaces(matrix: Complex) -> tuple[Complex, Complex]:
+    """Orthonormal left and right null spaces; the gap in the spectrum must be clear."""
+    factors, _, singular = zgetrf(matrix)
+    if not singular and zgecon(factors, np.linalg.norm(matrix, 1))[0] > WELL_CONDITIONED:
+        return np.empty((len(matrix), 0), np.complex128), np.empty((len(matrix), 0), np.complex128)
+    u, s, vh = np.linalg.svd(matrix)
+    rank = int(np.sum(s > NULL_TOLERANCE * s[0]))
+    if rank < len(s) and s[rank] > 1e-3 * s[rank - 1]:
+        raise AssertionError(f"rank is not clear: {s[rank - 1 :] / s[0]}")
+    return u[:, rank:], vh[rank:].conj().T
+
+
+class _Bordered:
+    """Least-norm solutions of a consistent system with known null spaces."""
+
+    def __init__(self, matrix: Complex, left: Complex, right: Complex) -> None:
+        self.size, free = right.shape
+        if free:
+            matrix = np.block([[matrix, left], [right.conj().T, np.zeros((free, free))]])
+        self.free = free
+        self.factors, self.pivots, singular = zgetrf(matrix)
+        if singular:
+            raise NotConvergedError("the circuit's equations have no one solution")
+
+    def solve(self, rhs: Complex) -> Complex:
+        padded = np.concatenate([rhs, np.zeros((self.free, *rhs.shape[1:]))])
+        x, _ = zgetrs(self.factors, self.pivots, padded)
+        self.contradiction = float(np.abs(x[self.size :]).max(initial=0.0))
+        return np.asarray(x[: self.size], dtype=np.complex128)
+
+
+def _block_diagonal(blocks: Sequence[Complex | float], sizes: Sequence[int]) -> Complex:
+    full = np.zeros((sum(sizes), sum(sizes)), dtype=np.complex128)
+    start = 0
+    for block, size in zip(blocks, sizes, strict=True):
+        full[start : start + size, start : start + size] = block
+        start += size
+    return full
+
+
+def solve_circuit(circuit: Circuit, start: dict[str, Floats]) -> Found:
+    """Solve; what depends on voltage is iterated from ``start``, nominal where that has none.
+
+    The network is reduced to the terminals of the groups once; with the admittances found
+    there the whole is solved again.
+
+    Raises
+    ------
+    NotConvergedError
+        No fixed point within the iterations, or no solution at all.
+    """
+    parts = _matrices(circuit)
+    groups = list(circuit.groups.values())
+    sizes = [len(group.plus) for group in groups]
+    spans = [slice(stop - size, stop) for size, stop in zip(sizes, np.cumsum(sizes), strict=True)]
+    steady = _block_diagonal([group.fixed_s for group in groups], sizes)
+    rhs = parts.rhs.copy()
+    for group, span in zip(groups, spans, strict=True):
+        rhs += parts.into[:, span] @ (group.fed_a * np.ones(len(group.plus)))
+
+    def admittance(pu: Floats) -> Complex:
+        varying = [group.varying(pu[span]) for group, span in zip(groups, spans, strict=True)]
+        return steady + _block_diagonal(varying, sizes)
+
+    def magnitudes(v: Complex) -> Floats:
+        own = [group.magnitudes(v[span]) for group, span in zip(groups, spans, strict=True)]
+        return np.concatenate([*own, np.empty(0)])
+
+    given = [start.get(name, np.ones(len(g.plus))) for name, g in circuit.groups.items()]
+    pu = np.concatenate([*given, np.empty(0)])
+    bends = np.repeat([g.exponent != 2.0 and bool(np.any(g.y_s)) for g in groups], sizes).astype(
+        bool
+    )
+    y_start = admittance(pu)
+    matrix = parts.fixed + parts.into @ y_start @ parts.across
+    left, right = _null_spaces(matrix)
+    seen = _Bordered(matrix, left, right).solve(np.column_stack([rhs, parts.into]))
+    v_start, z = parts.across @ seen[:, 0], parts.across @ seen[:, 1:]
+    eye = np.eye(len(pu))
+    for count in range(1, MAX_ITERATIONS + 1):
+        v = np.linalg.solve(eye + z @ (admittance(pu) - y_start), v_start)
+        found = magnitudes(v)
+        change = found - pu
+        relevant = change[bends & (np.maximum(found, pu) > FLOOR_PU)]
+        if not len(relevant) or np.abs(relevant).max() <= TOLERANCE:
+            break
+        pu = pu + (1.0 if count <= 100 else 0.5 if count <= 300 else 0.2) * change
+    else:
+        raise NotConvergedError(f"no fixed point after {MAX_ITERATIONS} iterations: {change}")
+
+    y = admittance(pu)
+    whole = _Bordered(parts.fixed + parts.into @ y @ parts.across, left, right)
+    x = whole.solve(rhs)
+    if whole.contradiction > 1e-9:
+        raise NotConvergedError("the circuit's equations contradict one another")
+    v = parts.across @ x
+    # the reduction at the start's admittances may be worse conditioned than the whole
+    if np.abs(magnitudes(v) - pu)[bends & (pu > FLOOR_PU)].max(initial=0.0) > 1e-10:
+        raise NotConvergedError("the reduced circuit and the whole disagree")
+    names = list(circuit.groups)
+    drawn = y @ v
+    for group, span in zip(groups, spans, strict=True):
+        drawn[span] -= group.fed_a
+    return Found(
+        x=np.asarray(x * np.array(circuit.column_scale)),
+        across={name: v[span] for name, span in zip(names, spans, strict=True)},
+        pu={name: magnitudes(v)[span] for name, span in zip(names, spans, strict=True)},
+        drawn_a={name: drawn[span] for name, span in zip(names, spans, strict=True)},
+        null=right,
+        iterations=count,
+    )
