@@ -94,8 +94,8 @@ class Event:
     emf_scale
         Factor on the source's EMF.
     taps, ders
-        By regulator: factors on the ratio of the three phases. By DER: the share of it
-        that runs after the event.
+        By regulator: factors on the ratio of the three phases. By DER: factor on what it
+        delivers after the event; 0: tripped.
     """
 
     open_line: str | None = None
@@ -140,7 +140,8 @@ class DenseSolution:
     load_va, source_va, loss_va, charging_va
         Power taken by each load, motor (``NAME.motor``), DER (``NAME.der``), capacitor
         (``NAME.capacitor``), step load (``step``) and shunt (``shunt N``); given by the EMF;
-        lost in source impedance, lines and transformers; taken by the lines' charging.
+        lost in the source's impedance and neutral, lines and transformers; taken by the
+        lines' charging.
     kept
         By DER: positive-sequence winding voltage and the current fed in there.
     iterations
@@ -177,6 +178,7 @@ def solve_dense(
     before: DenseSolution | None = None,
     opened: frozenset[str] = frozenset(),
     delta_step: int = 1,
+    hold: bool = False,
 ) -> DenseSolution:
     """Solve one state of a feeder, which is not changed.
 
@@ -200,6 +202,9 @@ def solve_dense(
         Points whose line end is detached from its bus.
     delta_step
         1 or 2: winding k of a D lies between phases k and k + delta_step (the vector group).
+    hold
+        Leave loads at their admittances at ``start`` instead of iterating them: where
+        ``load_pu`` then comes out as it went in, ``start`` is an operating point.
 
     Raises
     ------
@@ -247,7 +252,7 @@ def solve_dense(
         add_capacitor(circuit, bank, windings(node_of[f"C {bank.name}"], bank.connection, kv))
     _add_step(circuit, happening, feeder.source.v_phase_v)
     _add_shunts(circuit, happening, far, feeder.source.v_phase_v)
-    found = solve_circuit(circuit, start.load_pu if start is not None else {})
+    found = solve_circuit(circuit, start.load_pu if start is not None else {}, hold=hold)
     return _solution(circuit, handles, found, feeder)
 
 
@@ -380,6 +385,10 @@ def _solution(circuit: Circuit, handles: _Handles, found: Found, feeder: Feeder)
             complex(forward @ found.across[group]), -complex(forward @ found.drawn_a[group])
         )
 
+    in_neutral = 0j
+    if circuit.neutral is not None:
+        column, y = circuit.neutral
+        in_neutral = complex(abs(x[column]) ** 2 * np.conj(y))
     return DenseSolution(
         v={bus: at(bus) for bus in handles.buses},
         stubs={stub: at(stub) for stub in handles.stubs},
@@ -397,7 +406,7 @@ def _solution(circuit: Circuit, handles: _Handles, found: Found, feeder: Feeder)
         load_pu=found.pu,
         load_va={name: complex(v @ found.drawn_a[name].conj()) for name, v in found.across.items()},
         source_va=complex(handles.emf @ x[handles.i_source].conj()),
-        loss_va=complex(sum(x[c].conj() @ z @ x[c] for z, c in circuit.losses)),
+        loss_va=complex(sum(x[c].conj() @ z @ x[c] for z, c in circuit.losses)) + in_neutral,
         charging_va=complex(sum(at(n) @ (y @ at(n)).conj() for n, y in circuit.charging)),
         kept={der.name: kept(der.name) for der in feeder.ders},
         iterations=found.iterations,

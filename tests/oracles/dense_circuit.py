@@ -6,7 +6,7 @@ and *groups*: branches between terminals whose admittance depends on their own v
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,6 +38,7 @@ TOLERANCE = 1e-13
 MAX_ITERATIONS = 1000
 NULL_TOLERANCE = 1e-11
 """Singular values below this share of the largest count as zero."""
+REFINEMENTS = 3
 WELL_CONDITIONED = 1e-10
 """Reciprocal condition from which a matrix has no null space to look for."""
 
@@ -97,6 +98,8 @@ class Circuit:
     groups: dict[str, Group] = field(default_factory=dict)
     losses: list[tuple[Complex, list[int]]] = field(default_factory=list)
     charging: list[tuple[str, Complex]] = field(default_factory=list)
+    neutral: tuple[int, complex] | None = None
+    """Column of the source neutral's voltage, and its admittance to earth."""
 
     def columns(self, count: int, scale: float) -> list[int]:
         start = len(self.column_scale)
@@ -183,12 +186,17 @@ class _Matrices:
     across: Complex
 
 
+def _powers_of_two(scale: Sequence[float]) -> Floats:
+    """The scales, rounded so that scaling costs no digit."""
+    return np.asarray(2.0 ** np.round(np.log2(scale)), dtype=np.float64)
+
+
 def _matrices(circuit: Circuit) -> _Matrices:
     size = len(circuit.column_scale)
     if len(circuit.row_scale) != size:
         raise AssertionError("the circuit has not as many equations as unknowns")
-    columns = np.array(circuit.column_scale)
-    rows = np.array(circuit.row_scale)
+    columns = _powers_of_two(circuit.column_scale)
+    rows = _powers_of_two(circuit.row_scale)
     fixed = np.zeros((size, size), dtype=np.complex128)
     for r, c, value in circuit.entries:
         fixed[r, c] += value
@@ -233,6 +241,7 @@ class _Bordered:
         if free:
             matrix = np.block([[matrix, left], [right.conj().T, np.zeros((free, free))]])
         self.free = free
+        self.matrix = matrix
         self.factors, self.pivots, singular = zgetrf(matrix)
         if singular:
             raise NotConvergedError("the circuit's equations have no one solution")
@@ -240,6 +249,12 @@ class _Bordered:
     def solve(self, rhs: Complex) -> Complex:
         padded = np.concatenate([rhs, np.zeros((self.free, *rhs.shape[1:]))])
         x, _ = zgetrs(self.factors, self.pivots, padded)
+        if rhs.ndim == 1:
+            # residuals in extended precision: the reference has digits to spare
+            wide = self.matrix.astype(np.clongdouble)
+            for _ in range(REFINEMENTS):
+                left_over = (padded - wide @ x.astype(np.clongdouble)).astype(np.complex128)
+                x = x + zgetrs(self.factors, self.pivots, left_over)[0]
         self.contradiction = float(np.abs(x[self.size :]).max(initial=0.0))
         return np.asarray(x[: self.size], dtype=np.complex128)
 
@@ -253,11 +268,12 @@ def _block_diagonal(blocks: Sequence[Complex | float], sizes: Sequence[int]) -> 
     return full
 
 
-def solve_circuit(circuit: Circuit, start: dict[str, Floats]) -> Found:
+def solve_circuit(circuit: Circuit, start: Mapping[str, Floats], *, hold: bool = False) -> Found:
     """Solve; what depends on voltage is iterated from ``start``, nominal where that has none.
 
     The network is reduced to the terminals of the groups once; with the admittances found
-    there the whole is solved again.
+    there the whole is solved again. With ``hold`` they stay as they are at ``start``, and
+    ``pu`` tells what voltages come of that.
 
     Raises
     ------
@@ -292,7 +308,8 @@ def solve_circuit(circuit: Circuit, start: dict[str, Floats]) -> Found:
     seen = _Bordered(matrix, left, right).solve(np.column_stack([rhs, parts.into]))
     v_start, z = parts.across @ seen[:, 0], parts.across @ seen[:, 1:]
     eye = np.eye(len(pu))
-    for count in range(1, MAX_ITERATIONS + 1):
+    count = 0
+    for count in range(1, 1 if hold else MAX_ITERATIONS + 1):
         v = np.linalg.solve(eye + z @ (admittance(pu) - y_start), v_start)
         found = magnitudes(v)
         change = found - pu
@@ -301,7 +318,8 @@ def solve_circuit(circuit: Circuit, start: dict[str, Floats]) -> Found:
             break
         pu = pu + (1.0 if count <= 100 else 0.5 if count <= 300 else 0.2) * change
     else:
-        raise NotConvergedError(f"no fixed point after {MAX_ITERATIONS} iterations: {change}")
+        if not hold:
+            raise NotConvergedError(f"no fixed point after {MAX_ITERATIONS} iterations: {change}")
 
     y = admittance(pu)
     whole = _Bordered(parts.fixed + parts.into @ y @ parts.across, left, right)
@@ -310,14 +328,15 @@ def solve_circuit(circuit: Circuit, start: dict[str, Floats]) -> Found:
         raise NotConvergedError("the circuit's equations contradict one another")
     v = parts.across @ x
     # the reduction at the start's admittances may be worse conditioned than the whole
-    if np.abs(magnitudes(v) - pu)[bends & (pu > FLOOR_PU)].max(initial=0.0) > 1e-10:
+    worse = np.abs(magnitudes(v) - pu)[bends & (pu > FLOOR_PU)].max(initial=0.0)
+    if not hold and worse > 1e-10 * max(1.0, pu.max(initial=0.0)):
         raise NotConvergedError("the reduced circuit and the whole disagree")
     names = list(circuit.groups)
     drawn = y @ v
     for group, span in zip(groups, spans, strict=True):
         drawn[span] -= group.fed_a
     return Found(
-        x=np.asarray(x * np.array(circuit.column_scale)),
+        x=np.asarray(x * _powers_of_two(circuit.column_scale)),
         across={name: v[span] for name, span in zip(names, spans, strict=True)},
         pu={name: magnitudes(v)[span] for name, span in zip(names, spans, strict=True)},
         drawn_a={name: drawn[span] for name, span in zip(names, spans, strict=True)},

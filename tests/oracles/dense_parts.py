@@ -48,13 +48,8 @@ def line_matrix(z1: complex, z0: complex) -> Complex:
 
 
 def source_matrix(source: Source) -> Complex:
-    """Phase impedance of the source, circulant but not symmetric where Z1 and Z2 differ.
-
-    What stands between neutral and earth carries the three currents together: three times
-    itself in the zero sequence.
-    """
-    z0 = source.z0_ohm + 3 * source.neutral_ohm
-    z012 = np.diag([z0, source.z1_ohm, source.z2_ohm]).astype(np.complex128)
+    """Phase impedance of the source, circulant but not symmetric where Z1 and Z2 differ."""
+    z012 = np.diag([source.z0_ohm, source.z1_ohm, source.z2_ohm]).astype(np.complex128)
     return FORTESCUE @ z012 @ FORTESCUE.conj().T / 3
 
 
@@ -76,17 +71,20 @@ def _delta(node: str, step: int = 1) -> tuple[list[Terminal], list[Terminal]]:
 def add_source(circuit: Circuit, source: Source, emf_scale: float) -> tuple[list[int], Complex]:
     """EMF behind the sequence impedances; returns the currents' columns and the EMF.
 
-    An isolated neutral has a voltage of its own, and the three currents sum to zero.
+    A neutral that is not solid has a voltage of its own, and passes the sum of the three
+    currents: none where it is isolated.
     """
     v = source.v_phase_v
     z = source_matrix(source)
     emf = (source.emf_pu * v * emf_scale * FORTESCUE[:, 1]).astype(np.complex128)
     current = circuit.columns(3, circuit.s_base / v)
     neutral: list[tuple[int, complex]] = []
-    if source.neutral == "isolated":
+    if source.neutral == "isolated" or source.neutral_ohm:
         (column,) = circuit.columns(1, v)
         neutral = [(column, -1)]
-        circuit.row(circuit.s_base / v, [(c, 1) for c in current])
+        y = 0j if source.neutral == "isolated" else 1 / source.neutral_ohm
+        circuit.row(circuit.s_base / v, [*((c, 1 + 0j) for c in current), (column, y)])
+        circuit.neutral = (column, y)
     for k in range(3):
         circuit.leaves((source.bus, k), current[k], -1)
         terms = [(current[j], complex(z[k, j])) for j in range(3)]
@@ -279,32 +277,34 @@ class Kept:
     i1_a: complex
 
 
-def add_der(  # noqa: PLR0913 - the DER, where it is, and what it does now
+def add_der(
     circuit: Circuit, der: Der, at: Windings, v_phase: float, kept: Kept | None, factor: float
 ) -> None:
     """Group ``NAME.der``: its power before an event, what its model keeps after it.
 
-    ``factor`` is the share of it that still runs after the event.
+    ``factor`` multiplies what it delivers after the event, its EMF or current or power being
+    set accordingly at the voltage before; at 0 it is disconnected.
     """
     refer = (v_phase / at.v_nominal) ** 2
     y1, y2, y0 = (0j if z is None else refer / z for z in (der.z1_ohm, der.z2_ohm, der.z0_ohm))
     power: complex = 0j
     fed, fixed = 0j, 0j
     if kept is None or der.model == "constant_power":
-        power = -np.conj(power_va(der.kw, der.power_factor)) / 3 / at.v_nominal**2
+        power = -factor * np.conj(power_va(der.kw, der.power_factor)) / 3 / at.v_nominal**2
     elif der.model == "constant_current":
-        fed = kept.i1_a
+        fed = factor * kept.i1_a
     else:
-        fed, fixed = kept.i1_a + y1 * kept.v1_v, y1
+        fed, fixed = factor * kept.i1_a + y1 * kept.v1_v, y1
+    runs = factor != 0.0
     circuit.groups[f"{der.name}.der"] = Group(
         plus=at.plus,
         minus=at.minus,
         v_nominal=at.v_nominal,
-        y_s=machine_matrix(0, factor * power, 0),
+        y_s=machine_matrix(0, power, 0),
         exponent=0.0,
         machine=True,
-        fixed_s=factor * machine_matrix(y0, fixed, y2),
-        fed_a=factor * fed * FORTESCUE[:, 1],
+        fixed_s=runs * machine_matrix(y0, fixed, y2),
+        fed_a=runs * fed * FORTESCUE[:, 1],
     )
 
 
