@@ -432,12 +432,16 @@ def both(a: Matrix, v: Vector, b: Matrix, v_fork: Vector) -> Vector:
 
 
 @compiled
-def lift_neutral(work: Work) -> int:
-    """Shift the EMF (last row of V) so that the source's currents sum to zero; returns flags."""
+def lift_neutral(tree: Tree, work: Work) -> int:
+    """Shift the EMF (last row of V) by the neutral's voltage; returns flags.
+
+    The source's currents sum to what leaves the neutral. An impedance there, in the source's
+    zero sequence, would be thousands of times all others and cost as much in digits.
+    """
     last = work.y.shape[0]
     w, emf = load(work.w, 0), load_vector(work.v, last)
     sums, current = column_sums(w), plus(times(w, emf), load_vector(work.x_j, 0))
-    total = sums[0] + sums[1] + sums[2]
+    total = sums[0] + sums[1] + sums[2] + tree.neutral_y_s
     largest = 0.0
     for i in range(9):
         largest = max(largest, squared(w[i]))
@@ -632,8 +636,8 @@ def solve_block(
             set_admittances(tree, state, work, s, unit_v_pu, floor_pu)
             flags = climb(tree, state, work, s)
             store_vector(v, last, (emf, emf * turn, emf * turn.conjugate()))
-            if tree.isolated:
-                flags |= lift_neutral(work)
+            if tree.lifted:
+                flags |= lift_neutral(tree, work)
             descend(tree, state, work, s)
             change = update_magnitudes(tree, work, unit_v_pu, history, passes == 1)
             settled = linear or change <= tolerance_pu

@@ -194,13 +194,16 @@ def compile_network(
     units = _units(feeder)
     machines = machines_of(feeder, tuple(unit.name for unit in units), motors)
     load_unit, load_y = _loads(feeder, units)
+    source, neutral_y = feeder.source, _neutral_y(feeder.source)
+    source_z = phase_matrix(source.z0_ohm, source.z1_ohm, source.z2_ohm)
     tree = Tree(
         parent=parent,
-        z_ohm=np.array([_source_z(feeder.source), *_of_pieces(edge_pieces, "z_ohm")]),
+        z_ohm=np.array([source_z, *_of_pieces(edge_pieces, "z_ohm")]),
         end_y_s=np.array([NO_PHASES, *_of_pieces(edge_pieces, "end_y_s")]),
         charged=any(line.c1_nf_per_km or line.c0_nf_per_km for line in feeder.lines),
         regulator=_regulator_rows(feeder, edge_pieces),
-        isolated=feeder.source.neutral == "isolated",
+        lifted=source.neutral == "isolated" or neutral_y != 0.0,
+        neutral_y_s=neutral_y,
         in_loop=in_loop,
         fork=fork,
         tail=tail,
@@ -231,8 +234,10 @@ def compile_network(
     )
 
 
-def _source_z(source: Source) -> NDArray[np.complex128]:
-    return phase_matrix(source.z0_ohm + 3.0 * source.neutral_ohm, source.z1_ohm, source.z2_ohm)
+def _neutral_y(source: Source) -> complex:
+    """Admittance between the source's neutral and earth; 0 where it is isolated, or solid."""
+    extreme = source.neutral == "isolated" or source.neutral_ohm == 0.0
+    return 0j if extreme else 1.0 / complex(source.neutral_ohm)
 
 
 def _hang(

@@ -32,7 +32,8 @@ class Tree(NamedTuple):
     end_y_s: Complex  #: (B + 1, 3, 3) charging at each end of the edge, half of all it has
     charged: bool  #: any edge has charging
     regulator: Int  #: (B + 1,) row of ``State.ratio`` at the edge's upper end; -1: none
-    isolated: bool  #: the source's neutral has no connection to earth
+    lifted: bool  #: the source's neutral is not solidly earthed
+    neutral_y_s: complex  #: what stands between them; 0 where there is nothing
     in_loop: NDArray[np.bool_]  #: (B,) the node is on the chain that the chord closes
     fork: int  #: -1 where there is no loop
     tail: int  #: -1 where there is no loop
