@@ -112,8 +112,9 @@ def set_admittances(
         add_charging(tree, work, state.edge[s])
     node = state.far_node[s]
     if node >= 0:
+        far_y, far_between_y = state.far_y_s, state.far_between_y_s
         for i in range(3):
-            y[node, i, i] += state.far_y_s[i, s]
+            add_shunt(y, node, i, far_y[i, s], far_between_y[i, s])
     set_event_shunts(tree, state, work, s, unit_v_pu, floor_pu)
 
 
@@ -180,6 +181,16 @@ def add_circulant(stack: Complex, k: int, own: complex, ahead: complex, behind: 
 
 
 @compiled
+def add_shunt(stack: Complex, k: int, i: int, earth: complex, between: complex) -> None:
+    """Add to matrix k what lies from phase i to earth, and from it to the phase after it."""
+    following = (i + 1) % 3
+    stack[k, i, i] += earth + between
+    stack[k, following, following] += between
+    stack[k, i, following] -= between
+    stack[k, following, i] -= between
+
+
+@compiled
 def add_charging(tree: Tree, work: Work, edge: int) -> None:
     """Half of every edge's charging at its ends; of the event's edge the parts beyond it."""
     y, parents, end_y = work.y, tree.parent, tree.end_y_s
@@ -206,13 +217,8 @@ def set_event_shunts(
     step_y, between_y, fallen_y = state.step_y_s, state.between_y_s, state.fallen_y_s
     power = state.step_exponent[s] - 2.0
     for i in range(3):
-        following = (i + 1) % 3
-        between = between_y[i, s]
         factor = voltage_factor(unit_v_pu[-1, i], power, floor_pu)
-        event_y[0, i, i] += between + step_y[i, s] * factor
-        event_y[0, following, following] += between
-        event_y[0, i, following] -= between
-        event_y[0, following, i] -= between
+        add_shunt(event_y, 0, i, step_y[i, s] * factor, between_y[i, s])
         event_y[1, i, i] += fallen_y[i, s]
     if tree.charged:
         half = load(tree.end_y_s, edge)

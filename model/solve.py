@@ -69,6 +69,7 @@ def quiet_state(
         fallen_y_s=nothing,
         far_node=np.full(scenarios, -1, np.int64),
         far_y_s=nothing,
+        far_between_y_s=nothing,
     )
 
 
@@ -148,6 +149,7 @@ def _check(network: Network, state: State) -> None:
         "fallen_y_s": (3, s),
         "far_node": (s,),
         "far_y_s": (3, s),
+        "far_between_y_s": (3, s),
     }
     for name, shape in wanted.items():
         found = getattr(state, name).shape

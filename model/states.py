@@ -77,6 +77,7 @@ class State(NamedTuple):
     fallen_y_s: Complex  #: (3, S) from q to earth
     far_node: Int  #: (S,) node of a second step; -1: none
     far_y_s: Complex  #: (3, S) from there to earth
+    far_between_y_s: Complex  #: (3, S) there between phases a-b, b-c, c-a
 
 
 class Probes(NamedTuple):

@@ -39,8 +39,10 @@ class Event:
     between_after_s: Complex  #: (3, S)
     fallen_after_s: Complex  #: (3, S) at q to earth
     far_node: Int  #: (S,) the second place; -1: none
-    far_before_s: Complex  #: (3, S) there to earth
+    far_before_s: Complex  #: (3, S) there to earth, constant impedance
     far_after_s: Complex  #: (3, S)
+    far_between_before_s: Complex  #: (3, S) there between the phases
+    far_between_after_s: Complex  #: (3, S)
     emf_factor: Real  #: (S,) on the source EMF after the event
     tap_factor: Real  #: (R, 3, S) on the regulators' ratios after it
     load_factor: Real  #: (L, S) on the loads after it
@@ -100,6 +102,8 @@ def no_event(network: Network, size: int) -> Event:
         far_node=np.full(size, -1, np.int64),
         far_before_s=nothing,
         far_after_s=nothing,
+        far_between_before_s=nothing,
+        far_between_after_s=nothing,
         emf_factor=np.ones(size),
         tap_factor=np.ones((len(network.regulators), 3, size)),
         load_factor=np.ones((len(network.loads), size)),
@@ -129,6 +133,7 @@ def apply_event(network: Network, before: State, after: State, event: Event) -> 
         fallen_y_s=np.zeros_like(event.fallen_after_s),
         far_node=event.far_node,
         far_y_s=event.far_before_s,
+        far_between_y_s=event.far_between_before_s,
     )
     second = after._replace(
         emf_pu=after.emf_pu * event.emf_factor,
@@ -145,5 +150,6 @@ def apply_event(network: Network, before: State, after: State, event: Event) -> 
         fallen_y_s=event.fallen_after_s,
         far_node=event.far_node,
         far_y_s=event.far_after_s,
+        far_between_y_s=event.far_between_after_s,
     )
     return first, second

@@ -22,7 +22,7 @@ def draw_energisation(
     """Three phases close somewhere on a line; every region is as likely.
 
     What is beyond takes at once what it took when the network was whole; magnetizing inrush
-    is not modelled. DER beyond do not deliver yet: they wait for a steady voltage first.
+    is not modelled. DER beyond stay disconnected: they wait for a steady voltage first.
     """
     edge, share = draw_place(rng, size, regions)
     dead = fed_through(network, edge, der_nodes(network))

@@ -91,9 +91,14 @@ def put(event: Event, before: Shunt, after: Shunt) -> Event:
 
 def put_far(event: Event, node: NDArray[np.int64], before: Shunt, after: Shunt) -> Event:
     """``event`` with these shunts at ``node``, its second place."""
-    if before.between_s.any() or after.between_s.any():
-        raise ValueError("a step between phases at the second place: wanted one to earth")
-    return replace(event, far_node=node, far_before_s=before.earth_s, far_after_s=after.earth_s)
+    return replace(
+        event,
+        far_node=node,
+        far_before_s=before.earth_s,
+        far_after_s=after.earth_s,
+        far_between_before_s=before.between_s,
+        far_between_after_s=after.between_s,
+    )
 
 
 def one_of_three(rng: np.random.Generator, size: int) -> Bool:
