@@ -8,14 +8,15 @@ only what a feeder in service cannot be. It sees
 - one reversed current transformer: I2 and I0 both exceed I1, which no load does that takes
   power in every phase, and turning one phase's current round leaves little of either. Seen
   whatever the phase while the true |I2| and |I0| are below a seventh of |I1|, and up to half
-  of it for favourable angles;
+  of it for favourable angles. Where the section can be fed from both sides, phases may in truth
+  carry power in opposite directions; there the turn must also balance what the section takes,
+  the sum of the currents into it;
 - all current transformers of one end reversed: power flows into the section at both ends, or
   out of it at both. Only where the section can be fed from one side alone.
 
 It does not see: currents below ``least_a``; labels wrong at both ends alike, or currents alone
 wrong by whole rotations; a reversal of all currents in a closed loop or beside generation; one
-reversed transformer in a current that is itself very unbalanced. And a point whose phases carry
-power in opposite directions is to it the same as one reversed transformer.
+reversed transformer in a current that is itself very unbalanced.
 """
 
 from __future__ import annotations
@@ -27,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.points import Terminal
-from ..model.symmetrical import A
 from .evidence import Phasors, reversed_terminals
 from .superimpose import negative_sequence, positive_sequence, zero_sequence
 
@@ -35,6 +35,7 @@ __all__ = ["Alarm", "Limits", "fed_one_way", "wiring_alarm"]
 
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
+Real = NDArray[np.float64]
 
 
 class Alarm(IntEnum):
@@ -78,12 +79,17 @@ class Limits:
         currents are not judged: twenty times the error floor of 0.05 A of the contract.
     turned : float
         Share of I1 that I2 and I0 may have once the suspected current is turned round.
+    taken : float
+        Share that must be left of I2 and I0 of the sum of both ends' currents by the turn, at
+        most. In the paper's closed loop, with up to 500 kW on one phase anywhere, no state of
+        16,000 was doubted at a quarter, 140 at a half.
     """
 
     live_pu: float = 0.8
     apart_pu: float = 0.5
     least_a: float = 1.0
     turned: float = 0.5
+    taken: float = 0.25
 
 
 LIMITS = Limits()
@@ -105,33 +111,37 @@ def wiring_alarm(
     v_nominal_v : float
         Nominal phase voltage.
     one_way : (T,) bool array, optional
-        Sections that are fed from one side alone, whichever (``fed_one_way``): only there must
-        power that flows in at one end flow out at the other. By default none.
+        Sections that are fed from one side alone, whichever (``fed_one_way``). By default none.
     limits : Limits, optional
 
     Raises
     ------
     ValueError
-        ``one_way`` names a terminal whose other direction is not among ``terminals``.
+        A terminal's other direction is not among ``terminals``.
     """
     v, i = phasors.v[0], phasors.i[0]
-    live = (np.abs(v) >= limits.live_pu * v_nominal_v).all(axis=1)
-    v1, i1 = positive_sequence(v), positive_sequence(i)
-    disordered = live & (np.abs(negative_sequence(v)) > np.abs(v1))
-    one_reversed = _one_reversed(i, i1, limits)
-    active = (i1 * v1.conj()).real / v_nominal_v
     far = reversed_terminals(terminals)
-    if one_way is not None and (one_way & (far < 0)).any():
-        raise ValueError("one_way wants both directions of its sections among the terminals")
+    if (far < 0).any():
+        raise ValueError("wiring is judged by both ends: give both directions of each section")
+    live = (np.abs(v) >= limits.live_pu * v_nominal_v).all(axis=1)
+    v1 = positive_sequence(v)
+    disordered = live & (np.abs(negative_sequence(v)) > np.abs(v1))
+    turned = _turned(i, limits)
+    active_a = (positive_sequence(i) * v1.conj()).real / v_nominal_v
     alarm = np.zeros((len(terminals), v.shape[-1]), np.int8)
     for t, terminal in enumerate(terminals):
         ends = [terminal.local_point, terminal.remote_point]
+        into = np.array([terminal.into, terminals[far[t]].into])
+        sure = one_way is not None and bool(one_way[t])
         # the last assignment wins: what is told first is written last
-        if one_way is not None and one_way[t]:
-            inward = active[ends] * [[terminal.into], [terminals[far[t]].into]]
+        if sure:
+            inward = active_a[ends] * into[:, None]
             both = (inward >= limits.least_a).all(axis=0) | (inward <= -limits.least_a).all(axis=0)
             alarm[t, both] = Alarm.ALL_CURRENTS
-        alarm[t, one_reversed[ends].any(axis=0)] = Alarm.ONE_CURRENT
+        one = turned[ends]
+        if not sure and one.any():
+            one = _balanced_by_turn(i[ends] * into[:, None, None], one, limits)
+        alarm[t, one.any(axis=(0, 1))] = Alarm.ONE_CURRENT
         gap = np.abs(v1[ends[0]] - v1[ends[1]])
         apart = gap > limits.apart_pu * np.abs(v1[ends]).max(axis=0)
         alarm[t, apart & live[ends].all(axis=0)] = Alarm.ENDS_APART
@@ -146,19 +156,39 @@ def fed_one_way(terminals: tuple[Terminal, ...]) -> Flags:
     return np.asarray((far >= 0) & (load_side != load_side[far]))
 
 
-def _one_reversed(i: Complex, i1: Complex, limits: Limits) -> Flags:
-    """(P, S): the current of one phase is turned round."""
-    i2, i0 = negative_sequence(i), zero_sequence(i)
-    size = np.abs(i1)
-    suspect = (np.abs(i2) > size) & (np.abs(i0) > size)
-    found = np.zeros(i1.shape, np.bool_)
-    if not suspect.any():
-        return found
-    i1, i2, i0 = i1[suspect], i2[suspect], i0[suspect]
-    by_phase = i.transpose(0, 2, 1)[suspect].T
-    for k, own in enumerate(by_phase):
-        part = 2.0 * own / 3.0
-        size = np.abs(i1 - A**k * part)
-        rest = np.maximum(np.abs(i2 - A ** (-k) * part), np.abs(i0 - part))
-        found[suspect] |= (rest <= limits.turned * size) & (size >= limits.least_a)
+def _turned(i: Complex, limits: Limits) -> Flags:
+    """(P, 3, S): phases whose current, of (P, 3, S), seems to be turned round."""
+    found = np.zeros(i.shape, np.bool_)
+    size, i2, i0 = _sizes(i)
+    suspect = np.minimum(i2, i0) > size
+    if suspect.any():
+        p, s = np.nonzero(suspect)
+        for k in range(3):
+            size, i2, i0 = _sizes(_turn(i[p, :, s].T, k))
+            found[p, k, s] = np.maximum(i2, i0) <= limits.turned * size
+            found[p, k, s] &= size >= limits.least_a
     return found
+
+
+def _balanced_by_turn(inward: Complex, turned: Flags, limits: Limits) -> Flags:
+    """Those of ``turned`` (2 ends, 3, S) without which the section takes balanced current."""
+    found = turned.copy()
+    taken = inward.sum(axis=0)
+    _, i2, i0 = _sizes(taken)
+    most = limits.taken * np.maximum(i2, i0)
+    for end, k in np.argwhere(turned.any(axis=-1)):
+        _, i2, i0 = _sizes(taken - inward[end] + _turn(inward[end], k))
+        found[end, k] &= np.maximum(i2, i0) <= most
+    return found
+
+
+def _sizes(i: Complex) -> tuple[Real, Real, Real]:
+    """|I1|, |I2| and |I0| of phases on the axis before the last."""
+    return np.abs(positive_sequence(i)), np.abs(negative_sequence(i)), np.abs(zero_sequence(i))
+
+
+def _turn(i: Complex, k: int) -> Complex:
+    """(3, S) with phase k turned round."""
+    other = i.copy()
+    other[k] *= -1.0
+    return other
