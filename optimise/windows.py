@@ -49,7 +49,7 @@ class Remedy:
     A margin below 1 says that lowering it does not help.
     """
 
-    longest_section_ohm: float  #: |Z1| of the longest section, of the loop's angle
+    longest_section_ohm: float  #: |Z1| of the longest section, of the loop's angle; <= 0: none
     m1: float  #: largest with the present m2
     m2: float  #: largest with the present m1
     both: float  #: largest m1 = m2
@@ -98,23 +98,22 @@ def remedy(
     """
     (m1, m2), section, loop = loop_margins, abs(section_ohm), abs(loop_ohm)
     rest = abs(loop_ohm - section_ohm)
-    if section == 0.0:
-        return Remedy(
-            longest_section_ohm=loop / (1.0 + m1 * m2), m1=math.inf, m2=math.inf, both=math.inf
-        )
     if z_set_ohm is None:
         return Remedy(
             longest_section_ohm=loop / (1.0 + m1 * m2),
-            m1=rest / (m2 * section),
-            m2=rest / (m1 * section),
-            both=math.sqrt(rest / section),
+            m1=_ratio(rest, m2 * section),
+            m2=_ratio(rest, m1 * section),
+            both=math.sqrt(_ratio(rest, section)),
         )
-    short, long = z_set_ohm[z_set_ohm <= rest / m2], z_set_ohm[z_set_ohm >= m1 * section]
+    each = z_set_ohm.tolist()
     return Remedy(
-        longest_section_ohm=float(
-            np.minimum(z_set_ohm / m1, loop - m2 * z_set_ohm).max(initial=0.0)
-        ),
-        m1=float(short.max(initial=0.0)) / section,
-        m2=rest / float(long.min(initial=math.inf)),
-        both=float(np.minimum(z_set_ohm / section, rest / z_set_ohm).max(initial=0.0)),
+        longest_section_ohm=max((min(z / m1, loop - m2 * z) for z in each), default=0.0),
+        m1=max((_ratio(z, section) for z in each if m2 * z <= rest), default=0.0),
+        m2=max((_ratio(rest, z) for z in each if m1 * section <= z), default=0.0),
+        both=max((min(_ratio(z, section), _ratio(rest, z)) for z in each), default=0.0),
     )
+
+
+def _ratio(x: float, y: float) -> float:
+    """x/y of two numbers that are not negative, also where y is 0."""
+    return x / y if y else math.inf
