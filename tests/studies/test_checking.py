@@ -157,15 +157,15 @@ def test_everything_is_counted_where_it_stands() -> None:
         "units": ["at end", "tee"],
         "loads": ["mill", "inn"],
         "ders": ["roof"],
-        "capacitors": [],
+        "capacitors": ["bank"],
         "regulators": ["booster"],
         "switches": ["link"],
     }
     assert (first["yg_d"], first["yg_d_unknown"]) == (["tee"], ["at end"])
     assert first["length_km"] == pytest.approx(4.0)
     assert first["downstream_kw_nominal"] == [400.0, 400.0]
-    # points on the section's own side of their buses: the buses are outside it, bank and all
-    assert {kind: second[kind] for kind in KINDS} == dict.fromkeys(KINDS, [])
+    # both points stand inwards of their buses, whatever hangs there is outside
+    assert {kind: second[kind] for kind in KINDS} == {kind: [] for kind in KINDS}
     assert second["downstream_kw_nominal"] == [60.0, 60.0]
 
 
