@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from openphase.model import dump_feeder, feeder_from_toml, load_feeder
+from openphase.model import dump_feeder, feeder_from_toml, load_feeder, read_feeder
 from openphase.studies.checking import _text, summary
 from openphase.studies.cli import main
 from openphase.studies.run.spec import default_study
+from openphase.studies.show.feeder_layout import lay_out
 
 
 def test_summary_of_the_paper_s_feeder(capsys: pytest.CaptureFixture[str]) -> None:
@@ -189,6 +190,18 @@ def test_everything_is_listed_with_what_was_assumed() -> None:
         "- loads: motor_share 0.0 (mill, farm)",
     ):
         assert said in text
+
+
+def test_the_schematic_names_everything(tmp_path: Path) -> None:
+    path = tmp_path / "everything.toml"
+    path.write_text(EVERYTHING, encoding="utf-8")
+    said = "\n".join(mark.text for mark in lay_out(read_feeder(path)).units).splitlines()
+    for name in ("at SUB", "tee", "300 kW", "inn", "hydro", "bank", "300 kvar", "booster"):
+        assert said.count(name) == 1
+    assert said[said.index("at end") + 3] == "50 kW DER"
+    picture = tmp_path / "feeder.png"
+    assert main(["check", str(path), "--plot", str(picture)]) == 0
+    assert picture.stat().st_size > 10_000
 
 
 def test_a_feeder_without_sections_says_so() -> None:
