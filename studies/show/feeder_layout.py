@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass
 
-from ...model.parts import Feeder, Load, Place, Transformer
+from ...model.parts import Feeder, Place
 from ...model.topology import Tree, edges, forest, tree_path
 
 __all__ = ["FeederLayout", "Mark", "Tie", "Wire", "lay_out"]
@@ -52,7 +52,7 @@ class FeederLayout:
     source: str
     sections: tuple[str, ...]
     wires: tuple[Wire, ...]
-    units: tuple[Mark, ...]  #: transformers, and loads directly on the feeder
+    units: tuple[Mark, ...]  #: transformers, and all else that stands on the feeder
     points: tuple[Mark, ...]
     ties: tuple[Tie, ...]
     reach_km: float
@@ -173,15 +173,34 @@ def _units(
         share = place.at if near_is_from else 1.0 - place.at
         return wire.start_km + share * (wire.stop_km - wire.start_km), wire.row
 
-    kw: defaultdict[str, float] = defaultdict(float)
+    at: defaultdict[tuple[float, int], list[str]] = defaultdict(list)
+    for place, text in _labels(feeder):
+        at[stands(place)].append(text)
+    return tuple(Mark(text="\n".join(texts), km=x, row=r) for (x, r), texts in sorted(at.items()))
+
+
+def _labels(feeder: Feeder) -> list[tuple[Place, str]]:
+    """What stands where, with its size; what hangs on a transformer is added up there."""
+    behind: defaultdict[str, dict[str, float]] = defaultdict(lambda: {"kW": 0.0})
     for load in feeder.loads:
         if load.transformer is not None:
-            kw[load.transformer] += load.kw
-    direct = [load for load in feeder.loads if load.transformer is None]
-    at: defaultdict[tuple[float, int], list[str]] = defaultdict(list)
-    hosts: list[Transformer | Load] = [*feeder.transformers, *direct]
-    for host in hosts:
-        assert host.place is not None
-        power = kw[host.name] if isinstance(host, Transformer) else host.kw
-        at[stands(host.place)].append(f"{host.name}\n{host.connection}\n{power:g} kW")
-    return tuple(Mark(text="\n".join(texts), km=x, row=r) for (x, r), texts in sorted(at.items()))
+            behind[load.transformer]["kW"] += load.kw
+    for der in feeder.ders:
+        if der.transformer is not None:
+            own = behind[der.transformer]
+            own["kW DER"] = own.get("kW DER", 0.0) + der.kw
+    found: list[tuple[Place, str]] = []
+    for unit in feeder.transformers:
+        sizes = "\n".join(f"{size:g} {of}" for of, size in behind[unit.name].items())
+        found.append((unit.place, f"{unit.name}\n{unit.connection}\n{sizes}"))
+    for load in feeder.loads:
+        if load.place is not None:
+            found.append((load.place, f"{load.name}\n{load.connection}\n{load.kw:g} kW"))
+    for der in feeder.ders:
+        if der.place is not None:
+            found.append((der.place, f"{der.name}\n{der.kw:g} kW DER"))
+    for bank in feeder.capacitors:
+        found.append((bank.place, f"{bank.name}\n{bank.connection}\n{bank.kvar:g} kvar"))
+    for regulator in feeder.regulators:
+        found.append((Place(bus=regulator.to_bus), f"{regulator.name}\nregulator"))
+    return found

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from openphase.model import dump_feeder, load_feeder
+from openphase.model import dump_feeder, feeder_from_toml, load_feeder, read_feeder
 from openphase.studies.checking import _text, summary
 from openphase.studies.cli import main
 from openphase.studies.run.spec import default_study
+from openphase.studies.show.feeder_layout import lay_out
 
 
 def test_summary_of_the_paper_s_feeder(capsys: pytest.CaptureFixture[str]) -> None:
@@ -43,7 +44,11 @@ LONG = {
     "downstream_kw": [1000.0, 12000.0],
     "yg_d": [f"transformer {n}" for n in range(9)],
     "yg_d_sampled": [],
+    "yg_d_unknown": ["a bank nobody knows"],
     "units": [f"transformer {n}" for n in range(40)],
+    "ders": ["Solarpark"],
+    "capacitors": [],
+    "regulators": [f"Längsregler {n}" for n in range(9)],
     "switches": ["Schalter C"],
 }
 
@@ -59,6 +64,8 @@ def test_long_names_and_lists_fit_the_page(local: str) -> None:
     said = " ".join(" ".join(lines).split())
     for word in ("transformer", "Schalter C", "12.345", "400.011", "1000 .. 12000", "tie 39"):
         assert word in said
+    for word in ("Solarpark", "Längsregler 8", "nobody", "knows?"):
+        assert word in said
     assert all(said.count(word) for word in local.split())
 
 
@@ -73,6 +80,128 @@ def test_heads_stand_above_their_values(local: str) -> None:
     for title, value in (("km", "3"), ("|Z1| Ω", "0.390"), ("downstream kW", "200 .. 1920")):
         assert head.index(title) + len(title) == row.index(f" {value} ") + 1 + len(value)
     assert head.index("inside") == row.index("T1")
+
+
+EVERYTHING = """\
+format = 1
+name = "everything"
+imported_from = "everything.dss"
+
+[source]
+bus = "SUB"
+kv_ll = 12.47
+z1_ohm = [0.1, 0.9]
+neutral = "petersen"
+neutral_ohm = [2, 300]
+"""
+
+
+def line(name: str, start: str, end: str) -> str:
+    return (
+        f'[[lines]]\nname = "{name}"\nfrom = "{start}"\nto = "{end}"\nlength_km = 2\n'
+        "z1_ohm_per_km = [0.2, 0.4]\nz0_ohm_per_km = [0.5, 1.2]\n"
+    )
+
+
+def rows(table: str, *texts: str) -> str:
+    return "".join(f"[[{table}]]\n{text}\n" for text in texts)
+
+
+UNIT = "rating_kva = 500\nleakage_pu = [0.01, 0.05]"
+KINDS = ("units", "loads", "ders", "capacitors", "regulators", "switches")
+
+EVERYTHING += (
+    # the trunk: SUB -A- B1 -booster- B2 -B- B3 -link- B4 -C- B5; laterals from B2 and B3
+    line("A", "SUB", "B1")
+    + line("B", "B2", "B3")
+    + line("C", "B4", "B5")
+    + line("watched", "B2", "W")
+    + line("lateral", "B3", "L")
+    + rows("regulators", 'name = "booster"\nfrom = "B1"\nto = "B2"\ntaps = [2, 0, -1]')
+    + rows("switches", 'name = "link"\nfrom = "B3"\nto = "B4"\nclosed = true')
+    + rows(
+        "transformers",
+        f'name = "at SUB"\nbus = "SUB"\nconnection = "Yg/D"\n{UNIT}',
+        f'name = "at end"\nline = "B"\nat = 1\nconnection = "unknown"\n{UNIT}',
+        f'name = "tee"\nline = "lateral"\nat = 0.5\nconnection = "Yg/D"\n{UNIT}',
+        f'name = "beyond"\nbus = "B5"\nconnection = "D/D"\n{UNIT}',
+        f'name = "other"\nbus = "W"\nconnection = "D/Yg"\n{UNIT}',
+    )
+    + rows(
+        "loads",
+        'name = "mill"\ntransformer = "tee"\nkw = 300',
+        'name = "farm"\ntransformer = "beyond"\nkw = 60',
+        'name = "inn"\nbus = "L"\nkw = 40\nmotor_share = 0.5',
+    )
+    + rows(
+        "ders",
+        'name = "roof"\ntransformer = "at end"\nkw = 50\nmodel = "constant_current"',
+        'name = "hydro"\nbus = "B5"\nkw = 90\nmodel = "generator"\n'
+        "z1_ohm = [1, 20]\nz2_ohm = [1, 25]",
+    )
+    + rows("capacitors", 'name = "bank"\nline = "C"\nat = 0\nkvar = 300')
+    + rows(
+        "points",
+        'name = "R1"\nbus = "SUB"\nline = "A"',
+        'name = "R2"\nbus = "B4"\nline = "C"',
+        'name = "R3"\nbus = "B5"\nline = "C"',
+        'name = "R4"\nbus = "W"\nline = "watched"',
+    )
+    + rows("sections", 'local = "R1"\nremote = "R2"', 'local = "R2"\nremote = "R3"')
+)
+
+
+def test_everything_is_counted_where_it_stands() -> None:
+    found = summary(feeder_from_toml(EVERYTHING, "f"), default_study("none"))
+    first, second = found["sections"]
+    assert {kind: first[kind] for kind in KINDS} == {
+        "units": ["at end", "tee"],
+        "loads": ["mill", "inn"],
+        "ders": ["roof"],
+        "capacitors": ["bank"],
+        "regulators": ["booster"],
+        "switches": ["link"],
+    }
+    assert (first["yg_d"], first["yg_d_unknown"]) == (["tee"], ["at end"])
+    assert first["length_km"] == pytest.approx(4.0)
+    assert first["downstream_kw_nominal"] == [400.0, 400.0]
+    # both points stand inwards of their buses, whatever hangs there is outside
+    assert {kind: second[kind] for kind in KINDS} == {kind: [] for kind in KINDS}
+    assert second["downstream_kw_nominal"] == [60.0, 60.0]
+
+
+def test_everything_is_listed_with_what_was_assumed() -> None:
+    feeder = feeder_from_toml(EVERYTHING, "f")
+    found = summary(feeder, default_study("none"))
+    text = _text(found)
+    assert max(map(len, text.splitlines())) <= 100
+    assert sum(found["values"].values()) == len(feeder.origins)
+    for said in (
+        "12.47 kV, 4 wires, neutral petersen",
+        "DER: roof (50 kW, constant_current), hydro (90 kW, generator)",
+        "capacitors: bank (300 kvar, wye)",
+        "regulators: booster (taps +2, 0, -1)",
+        "note: inside R1–R2 the taps of booster may change, which looks like an open phase",
+        f"values: {found['values']['imported']} imported, ",
+        " 1 unknown (from everything.dss)",
+        "- transformers of unknown connection are drawn by a study; until then they count as Yg/Yg",
+        "- transformers: connection unknown (at end)",
+        "- source: frequency_hz 60.0",
+        "- loads: motor_share 0.0 (mill, farm)",
+    ):
+        assert said in text
+
+
+def test_the_schematic_names_everything(tmp_path: Path) -> None:
+    path = tmp_path / "everything.toml"
+    path.write_text(EVERYTHING, encoding="utf-8")
+    said = "\n".join(mark.text for mark in lay_out(read_feeder(path)).units).splitlines()
+    for name in ("at SUB", "tee", "300 kW", "inn", "hydro", "bank", "300 kvar", "booster"):
+        assert said.count(name) == 1
+    assert said[said.index("at end") + 3] == "50 kW DER"
+    picture = tmp_path / "feeder.png"
+    assert main(["check", str(path), "--plot", str(picture)]) == 0
+    assert picture.stat().st_size > 10_000
 
 
 def test_a_feeder_without_sections_says_so() -> None:
