@@ -33,6 +33,10 @@ Kind = Literal[
     "integers",
     "table",
     "tables",
+    "distribution",
+    "whole",
+    "choice",
+    "names",
 ]
 
 
@@ -53,7 +57,9 @@ class Field:
         - ``impedance``: ``[r, x]`` or ``{ mag, deg }``, bounds are on the magnitude and
           the resistance is never negative;
         - ``range``: ``[low, high]``; ``numbers``, ``integers``: a list; bounds are on each;
-        - ``table``, ``tables``: one table, an array of tables; not checked any deeper.
+        - ``table``, ``tables``: one table, an array of tables; not checked any deeper;
+        - ``distribution``, ``whole`` (of whole numbers), ``choice`` (of texts), ``names``:
+          what a study file has besides, checked there.
     doc
         One sentence for the documentation.
     unit
@@ -129,6 +135,10 @@ _KIND_WORDS: dict[Kind, str] = {
     "integers": "a list of integers",
     "table": "a table",
     "tables": "an array of tables",
+    "distribution": "a number, [low, high] or a distribution",
+    "whole": "a whole number, [least, most] or a distribution of whole numbers",
+    "choice": "a text, a list of texts or { values = [...], weights = [...] }",
+    "names": "a list of names",
 }
 
 
