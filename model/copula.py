@@ -45,19 +45,28 @@ def normal_correlations(count: int, ranks: Mapping[tuple[int, int], float]) -> R
 
 
 def contradiction(correlations: Real) -> tuple[int, ...]:
-    """Return the variables whose correlations cannot all hold at once; none if they can.
+    """Return variables whose correlations cannot all hold at once; none if all can.
 
-    They are those with a part in the combination that would have the most negative variance.
+    They are as few as possible: without any one of them, the others' could hold.
 
     Examples
     --------
     >>> contradiction(normal_correlations(4, {(0, 1): 0.9, (1, 3): 0.9, (0, 3): -0.9}))
     (0, 1, 3)
     """
-    variances, combinations = np.linalg.eigh(correlations)
-    if variances[0] >= -ROUNDING:
+    if _can_hold(correlations):
         return ()
-    return tuple(int(k) for k in np.flatnonzero(np.abs(combinations[:, 0]) > ROUNDING**0.5))
+    kept = list(range(len(correlations)))
+    for variable in range(len(correlations)):
+        rest = [k for k in kept if k != variable]
+        if not _can_hold(correlations[np.ix_(rest, rest)]):
+            kept = rest
+    return tuple(kept)
+
+
+def _can_hold(correlations: Real) -> bool:
+    """Tell whether no combination of the variables would have a negative variance."""
+    return bool(np.linalg.eigvalsh(correlations)[0] >= -ROUNDING)
 
 
 def joint_uniforms(rng: np.random.Generator, size: int, correlations: Real) -> Real:

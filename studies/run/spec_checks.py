@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from ...model.errors import InputError, KeyPath, Report
 from ...model.fields import as_toml, did_you_mean
@@ -23,6 +23,13 @@ _NEEDS = {"thevenin": ("z1_ohm",), "generator": ("z1_ohm", "z2_ohm")}
 def is_faulty(path: KeyPath, report: Report) -> bool:
     """Tell whether a value, or anything inside it, has been reported."""
     return any(found[: len(path)] == path for found in report.paths)
+
+
+def _written(path: tuple[str, str], report: Report) -> str | None:
+    """Return a value as the user wrote it, None where it is left out."""
+    table, key = path
+    row = report.document.get(table)
+    return as_toml(row[key]) if isinstance(row, Mapping) and key in row else None
 
 
 def try_grid(grid: Callable[[], object], path: KeyPath, found: str, report: Report) -> None:
@@ -56,9 +63,9 @@ def _check_counts(study: Study, report: Report) -> None:
     draw = study.transformers
     most = draw.yg_d_count.support[1]
     if most > len(draw.yg_d) and not is_faulty(("transformers",), report):
+        path = ("transformers", "yg_d_count")
         rule = f"must not exceed the {len(draw.yg_d)} units named by yg_d"
-        found = as_toml(as_table(draw)["yg_d_count"])
-        report.add(("transformers", "yg_d_count"), rule, found)
+        report.add(path, rule, _written(path, report))
 
 
 def _check_groups(study: Study, report: Report) -> None:
@@ -92,7 +99,8 @@ def _check_correlations(study: Study, report: Report) -> None:
         impossible = [study.correlations[index] for index in contradicting(study.correlations)]
         if impossible:
             pairs = ", ".join(f"{' with '.join(c.between)} at {c.rank:g}" for c in impossible)
-            report.add(("correlations",), f"must be possible together, unlike {pairs}")
+            rule = f"must be possible together, unlike {pairs}, and 0 where nothing is said"
+            report.add(("correlations",), rule)
 
 
 def _varies(study: Study, name: str) -> bool:

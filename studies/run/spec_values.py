@@ -77,11 +77,12 @@ def _plain_value(value: object, field: Field, path: KeyPath, report: Report) -> 
 
 def _read_shape(value: Mapping[str, object], path: KeyPath, report: Report) -> Distribution:
     """Return the distribution of a table such as ``{ normal = [..], within = [..] }``."""
-    shape = next((key for key in (*_SHAPES, "values") if key in value), None)
-    if shape is None:
-        known = ", ".join((*_SHAPES, "values"))
-        report.add(path, f"must have one of the keys {known}", as_toml(value))
+    known = (*_SHAPES, "values")
+    shapes = [key for key in known if key in value]
+    if len(shapes) != 1:
+        report.add(path, f"must have one of the keys {', '.join(known)}", as_toml(value))
         return _STAND_IN
+    (shape,) = shapes
     if shape == "values":
         return Values(**check_table(value, _VALUES, path, report))
     kind, keys = _SHAPES[shape]
