@@ -86,22 +86,16 @@ def _read_shape(value: Mapping[str, object], path: KeyPath, report: Report) -> D
     if shape == "values":
         return Values(**check_table(value, _VALUES, path, report))
     kind, keys = _SHAPES[shape]
+    number: Kind = "integers" if shape == "integers" else "numbers"
     faults = len(report.faults)
-    wanted = [Field(name=key, kind="numbers", required=True, doc="") for key in keys]
+    wanted = [Field(name=key, kind=number, required=True, doc="") for key in keys]
     given = check_table(value, wanted, path, report)
-    numbers: dict[str, float] = {}
+    named: dict[str, float] = {}
     for key, names in keys.items():
         if len(report.faults) == faults and len(given[key]) != len(names):
             report.add((*path, key), f"must be [{', '.join(names)}]", as_toml(value[key]))
-        numbers |= zip(names, given[key], strict=False)
-    if len(report.faults) > faults:
-        return _STAND_IN
-    if shape != "integers":
-        return kind(**numbers)
-    if not all(number.is_integer() for number in numbers.values()):
-        report.add((*path, shape), "must be whole numbers", as_toml(value[shape]))
-        return _STAND_IN
-    return kind(**{name: int(number) for name, number in numbers.items()})
+        named |= zip(names, given[key], strict=False)
+    return kind(**named) if len(report.faults) == faults else _STAND_IN
 
 
 _VALUES = (

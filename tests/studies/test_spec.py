@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from openphase.detector.instruments import Wiring
+from openphase.detector.options import Options
 from openphase.model import Feeder, InputError, load_feeder, shipped_feeders
 from openphase.model.distributions import (
     Choices,
@@ -517,7 +519,7 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
         ),
         (
             ("[transformers]", 'yg_d = ["T4"]', "yg_d_count = { integers = [0, 0.5] }"),
-            "4: transformers: yg_d_count: integers must be whole numbers, got [0, 0.5]",
+            "4: transformers: yg_d_count: integers must be a list of integers, got [0, 0.5]",
         ),
         (
             ("[loads]", 'level = "high"'),
@@ -813,6 +815,24 @@ def test_a_der_needs_the_impedances_of_what_it_may_be(paper: Feeder) -> None:
         "2 faults",
     ]
     check_study(drawn, dataclasses.replace(paper, ders=(der("A", 1j, 2j),)), "s.toml")
+
+
+# ---- what the detector is told ----
+
+
+def test_the_criteria_get_every_option() -> None:
+    assert DetectorOptions().options() == Options()
+    told = FULL.detector.options()
+    for option in dataclasses.fields(Options):
+        assert getattr(told, option.name) == getattr(FULL.detector, option.name)
+        assert getattr(told, option.name) != getattr(Options(), option.name)
+    names = {field.name for field in dataclasses.fields(DetectorOptions)}
+    assert names == {"dt_ms", "delay_ms"} | {field.name for field in dataclasses.fields(Options)}
+
+
+def test_every_wiring_fault_has_a_name() -> None:
+    kinds = [kind for kinds in WIRING_KINDS.values() for kind in kinds]
+    assert sorted(kinds) == [kind for kind in Wiring if kind != Wiring.RIGHT]
 
 
 # ---- what decides the draws ----
