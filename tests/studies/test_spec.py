@@ -519,7 +519,8 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
         ),
         (
             ("[transformers]", 'yg_d = ["T4"]', "yg_d_count = { integers = [0, 0.5] }"),
-            "4: transformers: yg_d_count: integers must be a list of integers, got [0, 0.5]",
+            "4: transformers: yg_d_count: integers must be a list of integers,"
+            " -100000 to 100000, got [0, 0.5]",
         ),
         (
             ("[loads]", 'level = "high"'),
@@ -528,8 +529,8 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
         (("[loads]", "level = -1"), "3: loads: level must be 0 to 100, got -1"),
         (
             ("[loads]", "level = { norml = [1, 1] }"),
-            "3: loads: level must have one of the keys uniform, normal, lognormal, triangular,"
-            " integers, values, got { norml = [1, 1] }",
+            "3: loads: level must have just one of the keys uniform, normal, lognormal,"
+            " triangular, integers, values, got { norml = [1, 1] }",
         ),
         (
             ("[loads]", "level = { normal = [1, 1] }"),
@@ -537,8 +538,8 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
         ),
         (
             ("[loads]", "level = { uniform = [0, 1], normal = [1, 1] }"),
-            "3: loads: level must have one of the keys uniform, normal, lognormal, triangular,"
-            " integers, values, got { uniform = [0, 1], normal = [1, 1] }",
+            "3: loads: level must have just one of the keys uniform, normal, lognormal,"
+            " triangular, integers, values, got { uniform = [0, 1], normal = [1, 1] }",
         ),
         (
             ("[loads]", "level = { normal = [1], within = [0, 1] }"),
@@ -567,6 +568,10 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
             ("[ders]", "model = 3"),
             "3: ders: model must be a text, a list of texts or"
             " { values = [...], weights = [...] }, got 3",
+        ),
+        (
+            ("[events.energisation]",),
+            "2: events: energisation takes no table: there is nothing to choose",
         ),
         (
             ("[events]", 'without = ["open_phase"]'),
