@@ -53,7 +53,7 @@ def check_together(study: Study, report: Report) -> None:
     if study.certificate.confidence == 1.0 and not is_faulty(path, report):
         report.add(path, "must be < 1", "1.0")
     path = ("events", "without")
-    if "open_phase" in study.events.without and not is_faulty(path, report):
+    if "open_phase" in study.events.without:
         found = study.events.without.index("open_phase")
         report.add((*path, found), "cannot be left out: it is what must trip", "'open_phase'")
 

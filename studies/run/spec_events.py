@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...detector.instruments import Wiring
 from ...model.distributions import Choices, Distribution, Lognormal, Uniform, Values
 
 __all__ = [
@@ -64,14 +65,18 @@ CLASSES = (
 )
 """Every class of events, in the order of its number in the random streams."""
 
-WIRING_KINDS: dict[str, tuple[int, ...]] = {
-    "labels_swapped": (1, 2, 3),
-    "voltage_labels_swapped": (4, 5, 6),
-    "ct_reversed": (7, 8, 9),
-    "cts_reversed": (10,),
-    "labels_rotated": (11, 12),
+WIRING_KINDS: dict[str, tuple[Wiring, ...]] = {
+    "labels_swapped": (Wiring.SWAPPED_AB, Wiring.SWAPPED_BC, Wiring.SWAPPED_CA),
+    "voltage_labels_swapped": (
+        Wiring.VOLTAGES_SWAPPED_AB,
+        Wiring.VOLTAGES_SWAPPED_BC,
+        Wiring.VOLTAGES_SWAPPED_CA,
+    ),
+    "ct_reversed": (Wiring.REVERSED_A, Wiring.REVERSED_B, Wiring.REVERSED_C),
+    "cts_reversed": (Wiring.REVERSED_ALL,),
+    "labels_rotated": (Wiring.ROTATED_BCA, Wiring.ROTATED_CAB),
 }
-"""Wiring faults by name, with the numbers of ``instruments.miswire`` for each: by phase."""
+"""Wiring faults by name, and each as it may be for the different phases."""
 
 _LOAD_KW = Uniform(low=10.0, high=500.0)
 _TO_EARTH_OHM = Lognormal(median=200.0, sigma=1.0, low=20.0, high=2000.0)

@@ -6,9 +6,10 @@ The defaults are those of a study file in which nothing is said. The events stan
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
+from ...detector.options import BothEnds, Options
 from ...model.distributions import Choices, Distribution, Fixed, Uniform
 from .spec_device import Device
 from .spec_events import Events
@@ -16,7 +17,6 @@ from .spec_events import Events
 __all__ = [
     "UNKNOWN_CONNECTION",
     "Ambient",
-    "BothEnds",
     "CertificateDemand",
     "Correlation",
     "DerDraw",
@@ -32,7 +32,6 @@ __all__ = [
 ]
 
 GroupSettings = Literal["each", "one"]
-BothEnds = Literal["off", "no_small_z", "agree"]
 
 UNKNOWN_CONNECTION = {
     4: Choices(values=("Yg/Yg", "D/Yg", "Yg/D"), weights=(0.6, 0.3, 0.1)),
@@ -222,7 +221,7 @@ class Instruments:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorOptions:
-    """Options of the detector that are the same everywhere; see `detector.criteria.Options`.
+    """Options of the detector that are the same everywhere; more on them in `detector.options`.
 
     Parameters
     ----------
@@ -263,6 +262,10 @@ class DetectorOptions:
     unbalance: float = 0.0
     direction: bool = False
     both_ends: BothEnds = "off"
+
+    def options(self) -> Options:
+        """Return those of them that the criteria know."""
+        return Options(**{field.name: getattr(self, field.name) for field in fields(Options)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

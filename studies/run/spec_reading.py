@@ -12,7 +12,7 @@ from ...model.table_check import check_table
 from .spec_checks import check_together, try_grid
 from .spec_device import Steps
 from .spec_event_fields import EVENT_TABLES
-from .spec_events import Events, SwitchState
+from .spec_events import CLASSES, Events, SwitchState
 from .spec_fields import CORRELATIONS, DOCUMENT, EVENTS, GROUPS, STATES, STEPS, TABLES, part_of
 from .spec_parts import Correlation, Group, Study
 from .spec_values import READERS, Reader
@@ -27,7 +27,7 @@ def study_of(report: Report) -> Study:
     """
     top = check_table(report.document, DOCUMENT, (), report)
     raw = dict(top)
-    events = _given(top["events"], EVENTS, ("events",), report)
+    events = _given(_with_tables(top["events"], report), EVENTS, ("events",), report)
     raw |= {f"events.{name}": table for name, table in events.items() if name != "without"}
     parts = {
         table: replace(
@@ -60,6 +60,16 @@ def study_of(report: Report) -> Study:
 _NO_CORRELATION: dict[str, Any] = {"between": ("", ""), "rank": 0.0}
 
 
+def _with_tables(events: Mapping[str, object] | None, report: Report) -> dict[str, object]:
+    """Return the events but for classes that take no table, which are reported."""
+    rows = dict(events or {})
+    for name in CLASSES:
+        if name in rows and name not in EVENT_TABLES:
+            report.add(("events", name), "takes no table: there is nothing to choose")
+            del rows[name]
+    return rows
+
+
 def _given(
     raw: Mapping[str, object] | None, described: Sequence[Field], path: KeyPath, report: Report
 ) -> dict[str, Any]:
@@ -72,8 +82,10 @@ def _given(
         if read is not None and field.name in raw:
             values[field.name] = read(raw[field.name], field, (*path, field.name), report)
     rest = {key: value for key, value in raw.items() if key not in values}
-    others = [field for field in described if field.name not in values]
-    values |= check_table(rest, others, path, report)
+    others = [
+        replace(field, required=False) if field.name in values else field for field in described
+    ]
+    values = check_table(rest, others, path, report) | values
     return {key: values[key] for key in raw if key in values}
 
 

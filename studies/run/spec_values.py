@@ -30,6 +30,9 @@ Reader = Callable[[object, Field, KeyPath, Report], object]
 
 _STAND_IN = Fixed(value=1.0)
 
+_MOST_INTEGER = 1e5
+"""Far more than any count or tap, and small enough for a float to hold it exactly."""
+
 _SHAPES: dict[str, tuple[Callable[..., Distribution], dict[str, tuple[str, ...]]]] = {
     "uniform": (Uniform, {"uniform": ("low", "high")}),
     "normal": (Normal, {"normal": ("mean", "sd"), "within": ("low", "high")}),
@@ -80,28 +83,26 @@ def _read_shape(value: Mapping[str, object], path: KeyPath, report: Report) -> D
     known = (*_SHAPES, "values")
     shapes = [key for key in known if key in value]
     if len(shapes) != 1:
-        report.add(path, f"must have one of the keys {', '.join(known)}", as_toml(value))
+        report.add(path, f"must have just one of the keys {', '.join(known)}", as_toml(value))
         return _STAND_IN
     (shape,) = shapes
     if shape == "values":
         return Values(**check_table(value, _VALUES, path, report))
     kind, keys = _SHAPES[shape]
     faults = len(report.faults)
-    wanted = [Field(name=key, kind="numbers", required=True, doc="") for key in keys]
+    number: Kind = "integers" if shape == "integers" else "numbers"
+    most = _MOST_INTEGER if shape == "integers" else None
+    wanted = [
+        Field(name=key, kind=number, low=most and -most, high=most, required=True, doc="")
+        for key in keys
+    ]
     given = check_table(value, wanted, path, report)
-    numbers: dict[str, float] = {}
+    named: dict[str, float] = {}
     for key, names in keys.items():
         if len(report.faults) == faults and len(given[key]) != len(names):
             report.add((*path, key), f"must be [{', '.join(names)}]", as_toml(value[key]))
-        numbers |= zip(names, given[key], strict=False)
-    if len(report.faults) > faults:
-        return _STAND_IN
-    if shape != "integers":
-        return kind(**numbers)
-    if not all(number.is_integer() for number in numbers.values()):
-        report.add((*path, shape), "must be whole numbers", as_toml(value[shape]))
-        return _STAND_IN
-    return kind(**{name: int(number) for name, number in numbers.items()})
+        named |= zip(names, given[key], strict=False)
+    return kind(**named) if len(report.faults) == faults else _STAND_IN
 
 
 _VALUES = (

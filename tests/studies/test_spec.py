@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from openphase.detector.instruments import Wiring
+from openphase.detector.options import Options
 from openphase.model import Feeder, InputError, load_feeder, shipped_feeders
 from openphase.model.distributions import (
     Choices,
@@ -517,7 +519,8 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
         ),
         (
             ("[transformers]", 'yg_d = ["T4"]', "yg_d_count = { integers = [0, 0.5] }"),
-            "4: transformers: yg_d_count: integers must be whole numbers, got [0, 0.5]",
+            "4: transformers: yg_d_count: integers must be a list of integers,"
+            " -100000 to 100000, got [0, 0.5]",
         ),
         (
             ("[loads]", 'level = "high"'),
@@ -526,8 +529,8 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
         (("[loads]", "level = -1"), "3: loads: level must be 0 to 100, got -1"),
         (
             ("[loads]", "level = { norml = [1, 1] }"),
-            "3: loads: level must have one of the keys uniform, normal, lognormal, triangular,"
-            " integers, values, got { norml = [1, 1] }",
+            "3: loads: level must have just one of the keys uniform, normal, lognormal,"
+            " triangular, integers, values, got { norml = [1, 1] }",
         ),
         (
             ("[loads]", "level = { normal = [1, 1] }"),
@@ -535,8 +538,8 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
         ),
         (
             ("[loads]", "level = { uniform = [0, 1], normal = [1, 1] }"),
-            "3: loads: level must have one of the keys uniform, normal, lognormal, triangular,"
-            " integers, values, got { uniform = [0, 1], normal = [1, 1] }",
+            "3: loads: level must have just one of the keys uniform, normal, lognormal,"
+            " triangular, integers, values, got { uniform = [0, 1], normal = [1, 1] }",
         ),
         (
             ("[loads]", "level = { normal = [1], within = [0, 1] }"),
@@ -565,6 +568,10 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
             ("[ders]", "model = 3"),
             "3: ders: model must be a text, a list of texts or"
             " { values = [...], weights = [...] }, got 3",
+        ),
+        (
+            ("[events.energisation]",),
+            "2: events: energisation takes no table: there is nothing to choose",
         ),
         (
             ("[events]", 'without = ["open_phase"]'),
@@ -813,6 +820,24 @@ def test_a_der_needs_the_impedances_of_what_it_may_be(paper: Feeder) -> None:
         "2 faults",
     ]
     check_study(drawn, dataclasses.replace(paper, ders=(der("A", 1j, 2j),)), "s.toml")
+
+
+# ---- what the detector is told ----
+
+
+def test_the_criteria_get_every_option() -> None:
+    assert DetectorOptions().options() == Options()
+    told = FULL.detector.options()
+    for option in dataclasses.fields(Options):
+        assert getattr(told, option.name) == getattr(FULL.detector, option.name)
+        assert getattr(told, option.name) != getattr(Options(), option.name)
+    names = {field.name for field in dataclasses.fields(DetectorOptions)}
+    assert names == {"dt_ms", "delay_ms"} | {field.name for field in dataclasses.fields(Options)}
+
+
+def test_every_wiring_fault_has_a_name() -> None:
+    kinds = [kind for kinds in WIRING_KINDS.values() for kind in kinds]
+    assert sorted(kinds) == [kind for kind in Wiring if kind != Wiring.RIGHT]
 
 
 # ---- what decides the draws ----
