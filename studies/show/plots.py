@@ -118,6 +118,8 @@ def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch
 
 def _draw_borders(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
     """Draw the staircase of the training sample, as it is and with the demanded margin."""
+    if view.border is None or view.margin_border is None:
+        return []
     floor = view.limits_a[0], view.limits_ohm[0]
     x, y = (np.maximum(own, low) for own, low in zip(view.border, floor, strict=True))
     ax.fill_between(x, y, floor[1], color="#d9b38c", alpha=0.28, lw=0, zorder=1)
@@ -250,7 +252,7 @@ def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
     ax.set_title("Breaks found, with intervals; right of each bar its false trips, k of n events")
     handles = [
         Patch(facecolor=colour, edgecolor="white", hatch=hatch, label=name)
-        for name, (colour, hatch) in zip(view.names, OVERVIEW, strict=True)
+        for name, (colour, hatch) in zip(view.names, OVERVIEW, strict=False)
     ]
     below = -0.55 / (0.95 * len(view.terminals))
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, below), ncols=3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -83,41 +84,46 @@ dd { margin: 0 0 .3em 9em; }
 
 def write_report(
     result: dict[str, Any],
-    case: Case,
-    fronts: tuple[Front, ...],
-    validation: Validation,
+    cases: Sequence[Case],
+    fronts: Sequence[Sequence[Front]] | None,
+    validations: Sequence[Validation],
     folder: RunFolder,
 ) -> None:
-    """Draw the pictures of a finished sizing and write them and ``report.html``.
+    """Draw the pictures of a finished run and write them and ``report.html``.
 
     Parameters
     ----------
     result
-        What ``size --json`` prints.
-    case
-        The feeder and study.
+        What ``size --json`` or ``assess --json`` prints.
+    cases
+        The feeder and study, per group.
     fronts
-        Per terminal, the training events that no other outdoes.
-    validation
-        The validation sample.
+        Per group and terminal, the training events that no other outdoes; None: no training.
+    validations
+        The validation sample of each group.
     folder
         Where the report goes.
     """
     # matplotlib takes half a second to import: only a run that got here pays for it
     from .plots import plot_evidence, plot_feeder, plot_overview, plot_profile, png_of  # noqa: PLC0415
 
-    pictures = {"feeder.png": png_of(plot_feeder, case.feeder)}
+    pictures = {"feeder.png": png_of(plot_feeder, cases[0].feeder)}
     if result["compared"]:
         pictures["overview.png"] = png_of(plot_overview, overview_view(result))
-    for t, row in enumerate(result["sections"]):
+    terminals = len(cases[0].points.terminals)
+    for n, row in enumerate(result["sections"]):
         if row["classes"]:
-            evidence, profile = _picture_names(t, row)
-            view = evidence_view(case, t, row, fronts[t], validation)
+            group, t = divmod(n, terminals)
+            front = None if fronts is None else fronts[group][t]
+            evidence, profile = _picture_names(n, row)
+            view = evidence_view(cases[group], t, row, front, validations[group])
             pictures[evidence] = png_of(plot_evidence, view)
-            pictures[profile] = png_of(plot_profile, profile_view(case, t, validation))
+            pictures[profile] = png_of(
+                plot_profile, profile_view(cases[group], t, validations[group])
+            )
     for name, png in pictures.items():
         folder.write(name, png)
-    folder.write("report.html", report_html(result, case.study, pictures))
+    folder.write("report.html", report_html(result, cases[0].study, pictures))
 
 
 def _picture_names(t: int, row: dict[str, Any]) -> tuple[str, str]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...optimise.certificate import two_sided
 from ...optimise.staircase import Front, border
 from ..run.along import path_starts
-from ..run.certify import COMPARED, Validation
+from ..run.certify import Validation
 from ..run.classes import REPORTED
 from ..run.draw import Case
 from ..run.tally import PLACES
@@ -63,8 +63,8 @@ class EvidenceView:
     v_set_pu: float
     negative_sign: bool
     clouds: tuple[Cloud, ...]
-    border: tuple[Real, Real]  #: of the settings that trip falsely
-    margin_border: tuple[Real, Real]  #: of those that do not keep the demanded margin
+    border: tuple[Real, Real] | None  #: of the settings that trip falsely; None: no training
+    margin_border: tuple[Real, Real] | None  #: of those that do not keep the demanded margin
     margin: float
     chosen: Setting | None
     reference: Setting
@@ -114,7 +114,7 @@ class OverviewView:
 
 
 def evidence_view(
-    case: Case, t: int, row: dict[str, Any], front: Front, validation: Validation
+    case: Case, t: int, row: dict[str, Any], front: Front | None, validation: Validation
 ) -> EvidenceView:
     """What the evidence picture of terminal ``t`` shows; ``row`` is its part of the result."""
     study = case.study
@@ -137,8 +137,8 @@ def evidence_view(
         v_set_pu=v_set_pu,
         negative_sign=study.detector.negative_sign,
         clouds=clouds,
-        border=border(front, v_set_pu),
-        margin_border=border(front, v_set_pu, margin),
+        border=None if front is None else border(front, v_set_pu),
+        margin_border=None if front is None else border(front, v_set_pu, margin),
         margin=margin,
         chosen=chosen,
         reference=reference,
@@ -248,9 +248,14 @@ def _tees(case: Case, t: int, length_km: float) -> tuple[tuple[float, str], ...]
 def overview_view(result: dict[str, Any]) -> OverviewView:
     """What the overview picture shows."""
     bars: defaultdict[str, dict[str, Bar]] = defaultdict(dict)
+    names = tuple(dict.fromkeys(row["name"] for row in result["compared"]))
+    groups = len({row["setting_group"] for row in result["compared"]})
     for row in result["compared"]:
+        name = terminal_name(row)
+        if groups > 1:
+            name += f", {row['setting_group']}"
         found, reachable = row["detected"] is not None, row["opens"] - row["unreachable"]
-        bars[terminal_name(row)][row["name"]] = Bar(
+        bars[name][row["name"]] = Bar(
             share=row["detected"] / reachable if found and reachable else None,
             reason=row["reason"],
             low=row["dependability_low"] if found else 0.0,
@@ -259,7 +264,7 @@ def overview_view(result: dict[str, Any]) -> OverviewView:
             trials=row["trials"],
         )
     return OverviewView(
-        names=COMPARED,
+        names=names,
         terminals=tuple(bars),
-        bars=tuple(tuple(own[name] for name in COMPARED) for own in bars.values()),
+        bars=tuple(tuple(own[name] for name in names) for own in bars.values()),
     )
