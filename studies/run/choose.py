@@ -67,7 +67,7 @@ def more_blocks(
         rows = [r for r in BOUNDED if REPORTED[r].drawn == drawn and trials[r].any()]
         if not own or not rows or not case.judged.any():
             continue
-        counts = trials[np.ix_(rows, np.flatnonzero(case.judged))]
+        counts = trials[rows][:, case.judged]
         # a class that cannot occur at a terminal has no trials there, however many are drawn
         least = int(counts[counts > 0].min(initial=n))
         if least < n:

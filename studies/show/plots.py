@@ -13,7 +13,7 @@ from ...model.parts import Feeder
 from .feeder_layout import FeederLayout, Mark, Tie, lay_out
 from .figures import TALLEST, axes_or_new, house_style, png_of, save_figure, save_png
 from .sheet import setting_text
-from .views import Bar, Cloud, EvidenceView, OverviewView, ProfileView, Setting
+from .views import Bar, Cloud, EvidenceView, Family, OverviewView, ProfileView, Setting
 
 __all__ = [
     "plot_evidence",
@@ -31,14 +31,17 @@ Real = NDArray[np.float64]
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
 SKY, YELLOW, GREY = "#56B4E9", "#F0E442", "#777777"
 
-CLASSES: dict[tuple[str, str], tuple[str, str, str]] = {
-    ("open_inside", "inside"): ("break inside: must trip", BLUE, "o"),
-    ("load_step", "inside"): ("load step inside", ORANGE, "s"),
-    ("load_step", "outside"): ("load step outside", RED, "^"),
-    ("source_step", "outside"): ("source step", GREEN, "D"),
-    ("open_outside", "outside"): ("break outside", PURPLE, "v"),
+FAMILIES: dict[Family, tuple[str, str]] = {
+    Family.INSIDE: (BLUE, "o"),
+    Family.OUTSIDE: (PURPLE, "v"),
+    Family.LOAD: (ORANGE, "s"),
+    Family.SOURCE: (GREEN, "D"),
+    Family.FAULT: (RED, "^"),
+    Family.SWITCHING: (SKY, "p"),
+    Family.DER: (YELLOW, "h"),
+    Family.PAIR: (GREY, "X"),
 }
-"""Name and side of a class -> its words, colour and marker."""
+"""Colour and marker of each family of classes."""
 
 SECTION_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
 CROWDED = 24  #: units beyond which a schematic shows their names only
@@ -75,9 +78,9 @@ def plot_evidence(view: EvidenceView, ax: Axes | None = None) -> Axes:
 
 
 def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch:
-    """Draw one class; what cannot trip is faint and hollow. Returns its legend entry."""
-    text, colour, marker = CLASSES[cloud.name, cloud.side]
-    must_trip = cloud.name == "open_inside"
+    """Draw one family; what cannot trip is faint and hollow. Returns its legend entry."""
+    colour, marker = FAMILIES[cloud.family]
+    must_trip = cloud.family == Family.INSIDE
     size = 24 if must_trip else 13
     x = np.clip(cloud.di1_a, low[0] * 1.04, high[0] / 1.04)
     y = np.clip(cloud.z1_ohm, low[1] * 1.05, high[1] / 1.05)
@@ -112,7 +115,7 @@ def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch
         marker=marker,
         color=colour,
         markersize=5,
-        label=f"{text} ({able} of {x.size} shown can trip)",
+        label=f"{cloud.family} ({able} of {x.size} shown can trip)",
     )
 
 

@@ -114,7 +114,15 @@ def _group_head(name: str, rows: list[dict[str, Any]]) -> list[str]:
 
 def _setting_table(rows: list[dict[str, Any]], assessed: bool) -> list[str]:
     """The settings and what they are worth; what is assessed has no margin that is known."""
-    heads = ("I_set A", "V_set %", "Z_set Ω", "margin", "found", "false trips", "bound")
+    heads: tuple[str, ...] = (
+        "I_set A",
+        "V_set %",
+        "Z_set Ω",
+        "margin",
+        "found",
+        "false trips",
+        "bound",
+    )
     cells = [_setting_row(row) for row in rows]
     if assessed:
         at = heads.index("margin")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,9 @@ from numpy.typing import NDArray
 from ...optimise.certificate import two_sided
 from ...optimise.staircase import Front, border
 from ..run.along import path_starts
+from ..run.cases import Case
 from ..run.certify import Validation
-from ..run.classes import REPORTED
-from ..run.draw import Case
+from ..run.classes import REPORTED, DrawClass, reported_row
 from ..run.tally import PLACES
 from .sheet import terminal_name
 
@@ -22,6 +23,7 @@ __all__ = [
     "Bar",
     "Cloud",
     "EvidenceView",
+    "Family",
     "OverviewView",
     "ProfileView",
     "Setting",
@@ -44,12 +46,47 @@ class Setting:
     z_set_ohm: float
 
 
+class Family(StrEnum):
+    """Classes that share a colour, in a reader's words."""
+
+    INSIDE = "break inside: must trip"
+    OUTSIDE = "break elsewhere"
+    LOAD = "load, capacitor or motor step"
+    SOURCE = "source step or regulator tap"
+    FAULT = "fault"
+    SWITCHING = "tie switching, transfer, energisation, reclosing"
+    DER = "DER trip or ramp"
+    PAIR = "two at once"
+
+
+FAMILY = {
+    DrawClass.OPEN_PHASE: Family.OUTSIDE,
+    DrawClass.LOAD_STEP: Family.LOAD,
+    DrawClass.CAPACITOR_STEP: Family.LOAD,
+    DrawClass.MOTOR_START: Family.LOAD,
+    DrawClass.SOURCE_STEP: Family.SOURCE,
+    DrawClass.REGULATOR_TAP: Family.SOURCE,
+    DrawClass.EARTH_FAULT: Family.FAULT,
+    DrawClass.LINE_FAULT: Family.FAULT,
+    DrawClass.TIE_SWITCHING: Family.SWITCHING,
+    DrawClass.TRANSFER: Family.SWITCHING,
+    DrawClass.ENERGISATION: Family.SWITCHING,
+    DrawClass.RECLOSING: Family.SWITCHING,
+    DrawClass.DER_TRIP: Family.DER,
+    DrawClass.DER_RAMP: Family.DER,
+    DrawClass.OPEN_WITH_LOAD_STEP: Family.PAIR,
+    DrawClass.OPEN_WITH_DER_TRIP: Family.PAIR,
+    DrawClass.LOAD_SWAP: Family.PAIR,
+    DrawClass.STEP_WITH_TAP: Family.PAIR,
+}
+"""Of every class that may count as a false trip."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cloud:
-    """The sampled events of one class."""
+    """The sampled events of one family of classes."""
 
-    name: str
-    side: str
+    family: Family
     di1_a: Real
     z1_ohm: Real
     able: NDArray[np.bool_]  #: the sign and this V_set let it trip
@@ -152,16 +189,18 @@ def evidence_view(
 def _clouds(
     validation: Validation, t: int, v_set_pu: float, negative_sign: bool
 ) -> tuple[Cloud, ...]:
-    """The kept sample of terminal ``t`` by class, what must trip last, on top."""
+    """The kept sample of terminal ``t`` by family, what must trip last, on top."""
+    found: defaultdict[Family, list[Real]] = defaultdict(list)
+    for which, sample, side in validation.samples:
+        rows = reported_row(which.drawn)[side[t]]
+        for r in np.unique(rows[rows >= 0]):
+            kind = REPORTED[r].kind
+            if kind != "apart":
+                family = Family.INSIDE if kind == "must_trip" else FAMILY[which.drawn]
+                found[family].append(sample[t][:, rows == r])
     clouds = []
-    for own in sorted(REPORTED, key=lambda own: own.kind == "must_trip"):
-        if own.kind == "apart":
-            continue
-        parts = [
-            sample[t][:, np.isin(side[t], own.where)]
-            for which, sample, side in validation.samples
-            if which.drawn == own.drawn
-        ]
+    for family in (*list(Family)[1:], Family.INSIDE):
+        parts = found[family]
         di1_a, dv1_pu, real, imag = np.concatenate([np.empty((4, 0)), *parts], axis=1)
         able = (dv1_pu <= v_set_pu) & ((real != 0.0) | (imag != 0.0))
         if negative_sign:
@@ -169,8 +208,7 @@ def _clouds(
         if di1_a.size:
             clouds.append(
                 Cloud(
-                    name=own.name,
-                    side=own.side,
+                    family=family,
                     di1_a=di1_a,
                     z1_ohm=np.hypot(real, imag),
                     able=able,
