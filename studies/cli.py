@@ -22,6 +22,8 @@ VERBS = {
     },
     "study": {
         "size": "the best settings of every section, with their certificate",
+        "assess": "the same evidence for settings that exist already; nothing is chosen",
+        "compare": "runs that share their draws, scenario by scenario: what was gained, and lost",
     },
 }
 """Group, verb, and what the verb does in a line: ``--help`` is printed from here."""
@@ -115,7 +117,13 @@ def build_parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(
         dest="verb", metavar="VERB", required=True, prog="openphase", help=argparse.SUPPRESS
     )
-    arguments = {"check": _check_arguments, "solve": _solve_arguments, "size": _size_arguments}
+    arguments = {
+        "check": _check_arguments,
+        "solve": _solve_arguments,
+        "size": _size_arguments,
+        "assess": _assess_arguments,
+        "compare": _compare_arguments,
+    }
     for group in VERBS.values():
         for verb, summary in group.items():
             verb_parser = verbs.add_parser(verb, description=summary, allow_abbrev=False)
@@ -166,6 +174,37 @@ def _solve_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _size_arguments(parser: argparse.ArgumentParser) -> None:
     _add_feeder(parser)
+    _add_run(parser, "runs/<feeder>")
+    parser.set_defaults(handler=_size, resumes=True)
+
+
+def _assess_arguments(parser: argparse.ArgumentParser) -> None:
+    _add_feeder(parser)
+    parser.add_argument(
+        "--settings",
+        required=True,
+        metavar="SHEET.csv",
+        help="the settings to judge, as size writes them; or the word reference: the study's "
+        "[reference] at every terminal",
+    )
+    _add_run(parser, "runs/<feeder>-<sheet>")
+    parser.set_defaults(handler=_assess, resumes=True)
+
+
+def _compare_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "runs",
+        nargs="+",
+        type=Path,
+        metavar="RUN",
+        help="folders that size or assess left; each further one is compared with the first",
+    )
+    _add_json(parser)
+    parser.set_defaults(handler=_compare)
+
+
+def _add_run(parser: argparse.ArgumentParser, out: str) -> None:
+    """What every verb that draws scenarios takes."""
     parser.add_argument(
         "--study",
         type=Path,
@@ -186,14 +225,11 @@ def _size_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="J",
         help="processes at work; never changes a number (default: %(default)s)",
     )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="the run folder (default: runs/<feeder>)"
-    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help=f"the run folder (default: {out})")
     parser.add_argument(
         "--yes", action="store_true", help="do not stop at a study of more than ten minutes"
     )
     _add_json(parser)
-    parser.set_defaults(handler=_size, resumes=True)
 
 
 def _add_feeder(parser: argparse.ArgumentParser) -> None:
@@ -231,3 +267,15 @@ def _size(args: argparse.Namespace) -> int:
     from .sizing import size_command
 
     return size_command(args)
+
+
+def _assess(args: argparse.Namespace) -> int:
+    from .assessing import assess_command
+
+    return assess_command(args)
+
+
+def _compare(args: argparse.Namespace) -> int:
+    from .comparing import compare_command
+
+    return compare_command(args)

@@ -25,7 +25,8 @@ T = TypeVar("T")
 def block_name(which: BlockId) -> str:
     """A block's name in the run folder."""
     purpose, drawn = which.purpose.name.lower(), which.drawn.name.lower()
-    return f"{purpose}-{which.attempt}-{drawn}-{which.block:05d}"
+    group = f"g{which.group}-" if which.group else ""
+    return f"{purpose}-{which.attempt}-{group}{drawn}-{which.block:05d}"
 
 
 def run_blocks(

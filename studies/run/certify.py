@@ -1,9 +1,9 @@
-"""Validation: what an untouched sample says about chosen settings, and each terminal's status."""
+"""Validation: what an untouched sample says about settings, as the rows of a result."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,63 +11,59 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...detector.criteria import Reason, Settings
-from ...model.points import Terminal
 from ...optimise.certificate import share_of_alpha, two_sided, upper_bound
-from ...optimise.staircase import Front, factors, merge_fronts, nearest
-from ...optimise.thresholds import Choice
-from .classes import REPORTED, DrawClass, Purpose
-from .draw import BlockId, Case
-from .spec import Study
+from ...optimise.staircase import Front, merge_fronts
+from .cases import Case
+from .classes import REPORTED, DrawClass
+from .draw import BlockId
+from .engine import options_of
+from .options import options_text, trigger_text
+from .status import load_side_status, status_of
 from .tally import Tested
 
 __all__ = [
-    "COMPARED",
-    "NOT_BUILT",
+    "Given",
+    "Rival",
+    "Sheet",
     "Validation",
     "add_up",
+    "alpha_of",
     "compared_rows",
-    "judged",
+    "judged_pairs",
+    "not_covered",
+    "numerics",
     "section_row",
 ]
 
-#: what the certificate of this version does not cover
-NOT_BUILT = (
-    "Only the classes listed per terminal are drawn. Faults with intact conductors, regulator "
-    "taps, capacitor and motor switching, tie switching and transfer, PV, energisation and "
-    "reclosing are not: the bounds say nothing about them.",
-    "Ratio and angle errors of CTs and VTs, and clock errors, are not drawn: only the random "
-    "error stated above.",
+#: what no certificate of this version covers
+NOT_COVERED = (
     "Rare false trips are sampled, not hunted.",
     "ΔT and the operate delay are carried in the sheet, and not judged: one frame before the "
-    "event and one after it stand for all.",
+    "event and one after it, both steady, stand for all. Inrush, arcs and machines that swing "
+    "are not modelled.",
     "Event classes have no rates, so there are no false trips per year.",
-    "One setting group; each study has one state of its switches.",
 )
 
-BEST_AT_REFERENCE = "best at reference V_set"
-COMPARED = ("chosen", BEST_AT_REFERENCE, "reference")
+SPENT = "this sample is spent: run again with a new --seed"
 
 #: the criteria in the order in which a verdict names the first that fails
-CAUSES = (Reason.BLOCKED, Reason.CURRENT, Reason.VOLTAGE, Reason.IMPEDANCE, Reason.SIGN)
+CAUSES = tuple(reason for reason in Reason if reason != Reason.TRIP)
 
-#: the classes that must not trip, as a reason names them
-WORDS = {
-    ("load_step", "inside"): "load steps inside",
-    ("load_step", "outside"): "load steps outside",
-    ("source_step", "outside"): "source steps",
-    ("open_outside", "outside"): "breaks elsewhere",
-}
+MUST_TRIP = next(r for r, own in enumerate(REPORTED) if own.kind == "must_trip")
+MUST_NOT = [r for r, own in enumerate(REPORTED) if own.kind == "must_not_trip"]
 
-FEW_EFFECTIVE = 0.1  #: below this share of effective trials, zero trips show little
+
+# ---- adding up blocks ----
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Validation:
-    """All validation blocks together."""
+    """All validation blocks of one group together."""
 
     trials: NDArray[np.int64]  #: (R, T)
     effective: NDArray[np.int64]  #: (R, T)
     trips: NDArray[np.int64]  #: (K, R, T)
+    alarms: NDArray[np.int64]  #: (R, T)
     reachable: NDArray[np.int64]  #: (T,)
     found: NDArray[np.int64]  #: (K, T)
     missed: NDArray[np.int64]  #: (T, Reason)
@@ -78,19 +74,11 @@ class Validation:
     samples: tuple[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]], ...]  #: for pictures
 
 
-#: drawn classes as reasons name them
-DRAWN_WORDS = {
-    DrawClass.OPEN_PHASE: "breaks elsewhere",
-    DrawClass.LOAD_STEP: "load steps",
-    DrawClass.SOURCE_STEP: "source steps",
-    DrawClass.OPEN_THREE: "three-phase breaks",
-}
-
-#: how a reported class is drawn
-CLASS_IDS = {own.name: int(own.drawn) for own in REPORTED}
-
 #: what simply adds up over blocks
-ADDED = ("trials", "effective", "trips", "reachable", "found", "missed", "profile", "flags")
+ADDED = (
+    *("trials", "effective", "trips", "alarms", "reachable"),
+    *("found", "missed", "profile", "flags"),
+)
 
 SAMPLED_BLOCKS = 25  #: blocks of a class whose kept evidence goes into pictures
 
@@ -112,83 +100,134 @@ def add_up(blocks: Iterable[tuple[BlockId, Tested]], size: int) -> Validation:
     return Validation(front=front, scenarios=count, samples=tuple(samples), **total)
 
 
-def judged(terminals: tuple[Terminal, ...]) -> int:
-    """How many terminals share the error probability."""
-    return sum(not terminal.load_side for terminal in terminals)
+# ---- who shares the error probability ----
 
 
-def scenario_name(purpose: Purpose, attempt: int, scenario: NDArray[np.int64]) -> str:
-    """A scenario's identity: purpose-attempt-class-block:index."""
-    drawn, block, index = (int(n) for n in scenario)
-    stem = f"{purpose.name.lower()}-{attempt}-{DrawClass(drawn).name.lower()}-{block:05d}"
-    return f"{stem}:{index}"
+def judged_pairs(cases: Sequence[Case]) -> int:
+    """How many pairs of a terminal and a group share the error probability."""
+    return sum(int(case.judged.sum()) for case in cases)
 
 
-def section_row(
-    case: Case,
-    t: int,
-    choice: Choice | None,
-    validation: Validation,
-    training_front: Front,
-    attempt: int,
-) -> dict[str, Any]:
-    """What the result says about one directed terminal."""
-    terminal, study = case.points.terminals[t], case.study
-    alpha = share_of_alpha(study.certificate.confidence, attempt, judged(case.points.terminals))
-    row: dict[str, Any] = {
-        "local": terminal.local,
-        "remote": terminal.remote,
-        "setting_group": "all",
-        "status": "",
-        "reason": "",
-        "i_set_a": choice.i_set_a if choice else None,
-        "i_set_pu": round(choice.i_set_a / study.device.ct_primary_a, 10) if choice else None,
-        "v_set_pu": choice.v_set_pu if choice else None,
-        "z_set_ohm": choice.z_set_ohm if choice else None,
-        "dt_ms": study.detector.dt_ms,
-        "delay_ms": study.detector.delay_ms,
-        "trigger": "|dI1|",
-        "negative_sign": study.detector.negative_sign,
-        "line_z1_ohm": [terminal.line_z1_ohm.real, terminal.line_z1_ohm.imag],
-        "margin": choice.margin if choice and math.isfinite(choice.margin) else None,
-    }
-    if terminal.load_side:
-        row |= _no_evidence() | {
-            "status": "load_side",
-            "reason": "with the section cut, nothing behind this terminal feeds it",
-        }
-        return row
-    classes = [_class_row(r, t, choice, validation, alpha) for r in range(len(REPORTED))]
-    classes = [own for own in classes if own["trials"]]
-    must_not = [own for own in classes if own["kind"] == "must_not_trip"]
-    opens = int(validation.trials[0, t])
-    reachable = int(validation.reachable[t])
-    found = int(validation.found[0, t]) if choice else 0
-    low, high = two_sided(found, reachable, alpha)
+def alpha_of(cases: Sequence[Case], attempt: int) -> float:
+    """Error probability of each bound."""
+    confidence = cases[0].study.certificate.confidence
+    return share_of_alpha(confidence, attempt, judged_pairs(cases))
+
+
+def not_covered(validations: Sequence[Validation]) -> list[str]:
+    """What the bounds say nothing about, classes that were never drawn among them."""
+    drawn = np.any([own.trials.any(axis=1) for own in validations], axis=0)
+    seen = {own.drawn for own, any_trial in zip(REPORTED, drawn, strict=True) if any_trial}
+    left_out = ", ".join(own.words for own in DrawClass if own not in seen)
+    missing = [f"Not drawn, and so not covered: {left_out}."] if left_out else []
+    return [*missing, *NOT_COVERED]
+
+
+def numerics(validations: Sequence[Validation]) -> dict[str, int]:
+    """Scenarios with a dead conductor, a floating island, or loads that did not settle."""
+    flags = np.sum([own.flags for own in validations], axis=0)
+    return dict(zip(("dead", "floating", "not_converged"), flags.tolist(), strict=True))
+
+
+# ---- rows of a result ----
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """The setting a row speaks of, and what is known of it beside the validation sample."""
+
+    settings: Settings | None
+    margin: float | None = None  #: None: none is known, or infinite
+    nearest: dict[str, Any] | None = None  #: the training event it comes closest to
+    missing: str | None = None  #: why there is no setting
+    note: str | None = None  #: what else has to be said of it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sheet:
+    """What all rows of one group's sheet have in common."""
+
+    case: Case
+    validation: Validation
+    alpha: float
+    attempt: int
+    chosen: bool  #: the settings were chosen for this validation, which may be used up thereby
+
+
+def section_row(sheet: Sheet, t: int, given: Given) -> dict[str, Any]:
+    """What the result says about one directed terminal in one group."""
+    case = sheet.case
+    terminal, own = case.points.terminals[t], given.settings
+    row = _head(case, t, given)
+    if own is None and terminal.load_side:
+        status, reason = load_side_status(None)
+        return row | _no_evidence() | {"status": status, "reason": reason}
+    validation, alpha = sheet.validation, sheet.alpha
+    classes = [_class_row(r, t, own, validation, alpha) for r in range(len(REPORTED))]
+    classes = [one for one in classes if one["trials"]]
+    must_not = [one for one in classes if one["kind"] == "must_not_trip"]
+    row |= _dependability(t, 0, own, validation, alpha)
     row |= {
-        "opens": opens,
-        "unreachable": opens - reachable,
-        "detected": found if choice else None,
-        "dependability": found / reachable if choice and reachable else None,
-        "dependability_low": low if choice else None,
-        "dependability_high": high if choice else None,
-        "security_trials": sum(own["trials"] for own in must_not),
-        "false_trips": sum(own["trips"] for own in must_not) if choice else None,
-        "false_trip_upper": max((own["upper"] for own in must_not), default=1.0)
-        if choice
-        else None,
+        "security_trials": sum(one["trials"] for one in must_not),
+        "false_trips": sum(one["trips"] for one in must_not) if own else None,
+        "false_trip_upper": max((one["upper"] for one in must_not), default=1.0) if own else None,
         "false_trips_per_year_upper": None,
         "classes": classes,
-        "causes": _causes(validation.missed[t]) if choice else [],
-        "nearest_false_trip": _nearest(choice, training_front, attempt) if choice else None,
+        "causes": _causes(validation.missed[t]) if own else [],
+        "nearest_false_trip": given.nearest,
         "fixes": [],
     }
-    if choice is None:
-        row["status"], row["reason"] = "none", _no_setting(case, training_front)
-    else:
-        front = validation.front[t]
-        row["status"], row["reason"] = _status(case, row, must_not, front, attempt)
+    if own is None:
+        row["status"], row["reason"] = "none", given.missing or "no setting"
+        return row
+    status, reason = status_of(case, row, validation.front[t], sheet.attempt)
+    if terminal.load_side and not row["false_trips"]:
+        status, reason = load_side_status(row)
+    row["status"] = status
+    spent = SPENT if sheet.chosen and row["false_trips"] else None
+    row["reason"] = "; ".join(filter(None, (reason, spent, given.note)))
     return row
+
+
+def _head(case: Case, t: int, given: Given) -> dict[str, Any]:
+    """The keys that say which terminal and which setting a row is about."""
+    terminal, study, own = case.points.terminals[t], case.study, given.settings
+    options = own.options if own else options_of(study)
+    return {
+        "local": terminal.local,
+        "remote": terminal.remote,
+        "setting_group": case.group.name,
+        "status": "",
+        "reason": "",
+        "i_set_a": own.i_set_a if own else None,
+        "i_set_pu": round(own.i_set_a / study.device.ct_primary_a, 10) if own else None,
+        "v_set_pu": own.v_set_pu if own else None,
+        "z_set_ohm": own.z_set_ohm if own else None,
+        "dt_ms": study.detector.dt_ms,
+        "delay_ms": study.detector.delay_ms,
+        "trigger": trigger_text(options),
+        "negative_sign": options.negative_sign,
+        "options": options_text(options),
+        "line_z1_ohm": [terminal.line_z1_ohm.real, terminal.line_z1_ohm.imag],
+        "margin": given.margin if given.margin and math.isfinite(given.margin) else None,
+    }
+
+
+def _dependability(
+    t: int, k: int, own: Settings | None, validation: Validation, alpha: float
+) -> dict[str, Any]:
+    """Breaks inside, and how many of those that can be seen the k-th setting finds."""
+    opens, reachable = int(validation.trials[MUST_TRIP, t]), int(validation.reachable[t])
+    found = int(validation.found[k, t])
+    low, high = two_sided(found, reachable, alpha)
+    return {
+        "opens": opens,
+        "unreachable": opens - reachable,
+        "detected": found if own else None,
+        "dependability": found / reachable if own and reachable else None,
+        "dependability_low": low if own else None,
+        "dependability_high": high if own else None,
+    }
 
 
 def _no_evidence() -> dict[str, Any]:
@@ -211,19 +250,22 @@ def _no_evidence() -> dict[str, Any]:
 
 
 def _class_row(
-    r: int, t: int, choice: Choice | None, validation: Validation, alpha: float
+    r: int, t: int, own: Settings | None, validation: Validation, alpha: float
 ) -> dict[str, Any]:
-    own = REPORTED[r]
+    reported = REPORTED[r]
     trials, trips = int(validation.trials[r, t]), int(validation.trips[0, r, t])
-    return {
-        "name": own.name,
-        "kind": own.kind,
-        "side": own.side,
+    row = {
+        "name": reported.name,
+        "kind": reported.kind,
+        "side": reported.side,
         "trials": trials,
-        "effective_trials": int(validation.effective[r, t]) if choice else None,
-        "trips": trips if choice else None,
-        "upper": upper_bound(trips, trials, alpha) if choice else None,
+        "effective_trials": int(validation.effective[r, t]) if own else None,
+        "trips": trips if own else None,
+        "upper": upper_bound(trips, trials, alpha) if own else None,
     }
+    if reported.drawn == DrawClass.WIRING:
+        row["alarms"] = int(validation.alarms[r, t])
+    return row
 
 
 def _causes(missed: NDArray[np.int64]) -> list[dict[str, Any]]:
@@ -236,133 +278,47 @@ def _causes(missed: NDArray[np.int64]) -> list[dict[str, Any]]:
     ]
 
 
-def _nearest(choice: Choice, front: Front, attempt: int) -> dict[str, Any] | None:
-    """The training event that the setting comes closest to tripping in."""
-    n, factor = nearest(front, choice.i_set_a, choice.v_set_pu, choice.z_set_ohm)
-    if n < 0:
-        return None
-    return {
-        "class": DrawClass(int(front.scenario[n, 0])).name.lower(),
-        "factor": factor,
-        "scenario": scenario_name(Purpose.TRAIN, attempt, front.scenario[n]),
-    }
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rival:
+    """One of the settings that are judged side by side."""
+
+    name: str
+    settings: Settings | None
+    missing: str | None = None  #: why there is none
 
 
-def _status(
-    case: Case, row: dict[str, Any], must_not: list[dict[str, Any]], front: Front, attempt: int
-) -> tuple[str, str]:
-    """The status and the reason for it, of a terminal that has settings."""
-    demand = case.study.certificate
-    note = _weak_evidence(must_not)
-    if row["false_trips"]:
-        worst = max(must_not, key=lambda own: own["trips"] / own["trials"])
-        of_worst = front.scenario[:, 0] == CLASS_IDS[worst["name"]]
-        front = front.where(of_worst) if of_worst.any() else front
-        n, _ = nearest(front, row["i_set_a"], row["v_set_pu"], row["z_set_ohm"])
-        return "not_certified", (
-            f"{worst['trips']} false trip{'s' if worst['trips'] > 1 else ''} of "
-            f"{worst['trials']} in {_words(worst)}; worst scenario "
-            f"{scenario_name(Purpose.VALIDATE, attempt, front.scenario[n])}; "
-            "this sample is spent: run again with a new --seed"
-        )
-    if row["false_trip_upper"] > demand.target:
-        return "not_certified", (
-            f"no false trip, but the bound {row['false_trip_upper']:.2g} per event is above the "
-            f"target {demand.target:.2g}: too few scenarios{note}"
-        )
-    sure = math.floor(row["dependability_low"] * 1000) / 1000
-    if row["dependability_low"] >= demand.find_at_least:
-        return "set", f"no false trip, finds at least {sure:.3f}{note}"
-    return "weak", (
-        f"no false trip, but finds only {sure:.3f} for sure, {demand.find_at_least:g} wanted{note}"
-    )
-
-
-def _weak_evidence(must_not: list[dict[str, Any]]) -> str:
-    """A note that names the classes whose events hardly ever came near the thresholds."""
-    hollow = [
-        _words(own) for own in must_not if own["effective_trials"] < FEW_EFFECTIVE * own["trials"]
-    ]
-    if not hollow:
-        return ""
-    names = " and ".join(filter(None, [", ".join(hollow[:-1]), hollow[-1]]))
-    return f"; few of the {names} come near the thresholds: their zero is weak evidence"
-
-
-def _no_setting(case: Case, front: Front) -> str:
-    """Why no setting keeps the margin: what the strictest one keeps, and what blocks it."""
-    device, demand = case.study.device, case.study.certificate
-    strictest = (device.i_grid()[-1], device.v_grid_pu()[0], device.z_grid()[-1])
-    each = factors(front, *(np.array([value]) for value in strictest))[:, 0]
-    blocking = front.scenario[each < demand.margin, 0]
-    said = f"no setting of the device keeps the margin {demand.margin:g} in training"
-    if not blocking.size:
-        return said
-    drawn = DrawClass(int(np.bincount(blocking).argmax()))
-    share = float((blocking == drawn).mean())
-    return (
-        f"{said}: the strictest keeps {math.floor(each.min() * 100) / 100:g}; {share:.0%} of what "
-        f"blocks it are {DRAWN_WORDS[drawn]}. A lower margin, or a device with larger I_set and "
-        "Z_set or a smaller V_set, would help"
-    )
-
-
-def _words(own: dict[str, Any]) -> str:
-    """A class and its side in words."""
-    return WORDS[own["name"], own["side"]]
-
-
-def compared_rows(
-    case: Case,
-    t: int,
-    settings: tuple[Settings | None, ...],
-    validation: Validation,
-    attempt: int,
-) -> list[dict[str, Any]]:
-    """The chosen setting beside others, on the same validation sample."""
-    terminal = case.points.terminals[t]
-    alpha = share_of_alpha(
-        case.study.certificate.confidence, attempt, judged(case.points.terminals)
-    )
-    must_not = [r for r, own in enumerate(REPORTED) if own.kind == "must_not_trip"]
+def compared_rows(sheet: Sheet, t: int, rivals: Sequence[Rival]) -> list[dict[str, Any]]:
+    """Settings side by side on the same validation sample; the first is the row's own."""
+    terminal, validation = sheet.case.points.terminals[t], sheet.validation
+    trials = validation.trials[MUST_NOT, t]
     rows = []
-    opens, reachable = int(validation.trials[0, t]), int(validation.reachable[t])
-    for k, own in enumerate(settings):
-        found = int(validation.found[k, t])
-        low, high = two_sided(found, reachable, alpha)
+    for k, rival in enumerate(rivals):
+        own = rival.settings
+        trips = validation.trips[k, MUST_NOT, t]
         bounds = [
-            upper_bound(int(validation.trips[k, r, t]), int(validation.trials[r, t]), alpha)
-            for r in must_not
-            if validation.trials[r, t]
+            upper_bound(int(x), int(n), sheet.alpha)
+            for x, n in zip(trips, trials, strict=True)
+            if n
         ]
+        found = _dependability(t, k, own, validation, sheet.alpha)
         rows.append(
             {
                 "local": terminal.local,
                 "remote": terminal.remote,
-                "name": COMPARED[k],
+                "setting_group": sheet.case.group.name,
+                "name": rival.name,
                 "i_set_a": own.i_set_a if own else None,
                 "v_set_pu": own.v_set_pu if own else None,
                 "z_set_ohm": own.z_set_ohm if own else None,
-                "detected": found if own else None,
-                "opens": opens,
-                "unreachable": opens - reachable,
-                "dependability_low": low if own else None,
-                "dependability_high": high if own else None,
-                "false_trips": int(validation.trips[k, must_not, t].sum()) if own else None,
-                "trials": int(validation.trials[must_not, t].sum()),
+                "detected": found["detected"],
+                "opens": found["opens"],
+                "unreachable": found["unreachable"],
+                "dependability_low": found["dependability_low"],
+                "dependability_high": found["dependability_high"],
+                "false_trips": int(trips.sum()) if own else None,
+                "trials": int(trials.sum()),
                 "upper": max(bounds, default=1.0) if own else None,
-                "reason": None if own else _missing(case.study, COMPARED[k]),
+                "reason": None if own else rival.missing,
             }
         )
     return rows
-
-
-def _missing(study: Study, name: str) -> str:
-    """Why there is no setting of this name to compare."""
-    margin = f"keeps the margin {study.certificate.margin:g}"
-    if name != BEST_AT_REFERENCE:
-        return f"no setting {margin}"
-    wanted = study.reference.v_set_pct
-    if not np.isclose(study.device.v_grid_pu(), wanted / 100.0).any():
-        return f"the device has no V_set of {wanted:.10g} %"
-    return f"no setting with V_set {wanted:.10g} % {margin}"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,24 +13,107 @@ from numpy.typing import NDArray
 from ...detector.criteria import Settings
 from ...optimise.counts import Corners, Grid, merge
 from ...optimise.staircase import Front, merge_fronts
-from ...optimise.thresholds import Choice, Sample, choose
+from ...optimise.thresholds import Choice, Refusal, Sample, choose, pool
+from .cases import Case
 from .classes import REPORTED, DrawClass, Purpose
-from .draw import BlockId, Case
-from .engine import BLOCK
+from .draw import BlockId
+from .draw_event import draw_event, event_sides
+from .engine import BLOCK, options_of
 from .ledger import Attempt
+from .spec import Study
+from .status import common_window
 from .tally import Trained
 
-__all__ = ["Training", "choices", "gather", "more_blocks", "planned_blocks"]
+__all__ = [
+    "Chosen",
+    "Training",
+    "as_settings",
+    "choices",
+    "gather",
+    "more_blocks",
+    "one_for_all",
+    "planned_blocks",
+    "reference_settings",
+]
 
 MERGE_EVERY = 32  #: blocks gathered between merges; bounds memory, changes no result
+
+PILOT = 4000  #: events drawn, and not solved, to see how often each class and side comes up
 
 #: every class that the certificate bounds, and the breaks, need as many trials as asked for
 BOUNDED = tuple(r for r, own in enumerate(REPORTED) if own.kind != "apart")
 
 
+# ---- how much to draw ----
+
+
+def planned_blocks(case: Case, purpose: Purpose, attempt: Attempt) -> list[BlockId]:
+    """Blocks that most likely give every class, side and judged terminal its trials."""
+    n, blocks = attempt.scenarios, []
+    for drawn in case.drawn:
+        share = _smallest_share(case, drawn)
+        draws = n / share + 4.0 * math.sqrt(n * (1.0 - share)) / share
+        blocks += _blocks(case, purpose, attempt, drawn, range(math.ceil(draws / BLOCK)))
+    return blocks
+
+
+def more_blocks(
+    case: Case, had: list[BlockId], trials: NDArray[np.int64], attempt: Attempt
+) -> list[BlockId]:
+    """Further blocks for classes that are still short of trials at a judged terminal."""
+    n, blocks = attempt.scenarios, []
+    for drawn in case.drawn:
+        own = [which for which in had if which.drawn == drawn]
+        rows = [r for r in BOUNDED if REPORTED[r].drawn == drawn and trials[r].any()]
+        if not own or not rows or not case.judged.any():
+            continue
+        counts = trials[rows][:, case.judged]
+        # a class that cannot occur at a terminal has no trials there, however many are drawn
+        least = int(counts[counts > 0].min(initial=n))
+        if least < n:
+            extra = math.ceil(1.2 * (n - least) * len(own) / least)
+            new = range(len(own), len(own) + extra)
+            blocks += _blocks(case, own[0].purpose, attempt, drawn, new)
+    return blocks
+
+
+def _blocks(
+    case: Case, purpose: Purpose, attempt: Attempt, drawn: DrawClass, numbers: range
+) -> list[BlockId]:
+    return [
+        BlockId(
+            seed=attempt.seed,
+            purpose=purpose,
+            attempt=attempt.number,
+            group=case.group.index,
+            drawn=drawn,
+            block=block,
+        )
+        for block in numbers
+    ]
+
+
+def _smallest_share(case: Case, drawn: DrawClass) -> float:
+    """The smallest share of draws that any bounded class and judged terminal gets.
+
+    Seen in a pilot of its own, which no result depends on; what is rarer than one in the
+    pilot is left to `more_blocks`. A class that is told apart gets what is asked for in all.
+    """
+    rows = [REPORTED[r] for r in BOUNDED if REPORTED[r].drawn == drawn]
+    if not rows:
+        return 1.0
+    rng = np.random.Generator(np.random.SFC64(np.random.SeedSequence(0, spawn_key=(int(drawn),))))
+    side = event_sides(case, draw_event(rng, case, drawn, PILOT))[case.judged]
+    shares = np.array([np.isin(side, own.where).mean(axis=1) for own in rows])
+    return float(min(shares[shares > 0], default=1.0))
+
+
+# ---- adding up blocks ----
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Training:
-    """All training blocks together, per terminal."""
+    """All training blocks of one group together, per terminal."""
 
     opens: tuple[Corners, ...]
     stiff: tuple[Corners, ...]
@@ -37,68 +121,6 @@ class Training:
     front: tuple[Front, ...]
     trials: NDArray[np.int64]  #: (R, T)
     reachable: NDArray[np.int64]  #: (T,)
-
-
-def planned_blocks(case: Case, purpose: Purpose, attempt: Attempt) -> list[BlockId]:
-    """Blocks that most likely give every class, side and judged terminal its trials."""
-    n, blocks = attempt.scenarios, []
-    for drawn in DrawClass:
-        share = _smallest_share(case, drawn)
-        draws = n / share + 4.0 * math.sqrt(n * (1.0 - share)) / share
-        blocks += [
-            BlockId(
-                seed=attempt.seed, purpose=purpose, attempt=attempt.number, drawn=drawn, block=b
-            )
-            for b in range(math.ceil(draws / BLOCK))
-        ]
-    return blocks
-
-
-def more_blocks(case: Case, had: list[BlockId], trials: NDArray[np.int64], n: int) -> list[BlockId]:
-    """Further blocks for classes that are still below ``n`` trials at a judged terminal."""
-    judged = [t for t, terminal in enumerate(case.points.terminals) if not terminal.load_side]
-    blocks = []
-    for drawn in DrawClass:
-        own = [which for which in had if which.drawn == drawn]
-        rows = [r for r in BOUNDED if REPORTED[r].drawn == drawn and trials[r].any()]
-        if not own or not rows or not judged:
-            continue
-        counts = trials[np.ix_(rows, judged)]
-        # a class that cannot occur at a terminal has no trials there, however many are drawn
-        least = int(counts[counts > 0].min(initial=n))
-        if least < n:
-            per_block = least / len(own)
-            extra = math.ceil(1.2 * (n - least) / per_block)
-            blocks += [
-                BlockId(
-                    seed=own[0].seed,
-                    purpose=own[0].purpose,
-                    attempt=own[0].attempt,
-                    drawn=drawn,
-                    block=len(own) + b,
-                )
-                for b in range(extra)
-            ]
-    return blocks
-
-
-def _smallest_share(case: Case, drawn: DrawClass) -> float:
-    """The smallest share of draws that any bounded class and judged terminal gets."""
-    if drawn in (DrawClass.SOURCE_STEP, DrawClass.OPEN_THREE):
-        return 1.0
-    length = case.network.length_km
-    shares = []
-    for terminal in case.points.terminals:
-        if terminal.load_side:
-            continue
-        if drawn == DrawClass.LOAD_STEP:
-            inside = 1.0 / len(case.regions)
-            shares += [inside, 1.0 - inside]
-        else:
-            on_path = length[terminal.on_path].sum() / length.sum()
-            outside = length[~terminal.in_section].sum() / length.sum()
-            shares += [on_path, outside]
-    return float(min((share for share in shares if share > 0), default=1.0))
 
 
 def gather(blocks: Iterable[Trained]) -> Training:
@@ -111,7 +133,7 @@ def gather(blocks: Iterable[Trained]) -> Training:
     return _add(waiting)
 
 
-def _add(parts: list[Trained | Training]) -> Training:
+def _add(parts: Sequence[Trained | Training]) -> Training:
     terminals = range(len(parts[0].front))
     return Training(
         opens=tuple(merge([p.opens[t] for p in parts]) for t in terminals),
@@ -123,38 +145,93 @@ def _add(parts: list[Trained | Training]) -> Training:
     )
 
 
-def choices(case: Case, grid: Grid, training: Training) -> list[tuple[Choice | None, ...]]:
-    """Per terminal: the chosen setting and the best at the reference V_set; None: there is none."""
-    reference = case.study.reference
-    wanted = (reference.i_set_a, reference.v_set_pct / 100.0, reference.z_set_ohm)
-    at_reference_v = np.flatnonzero(np.isclose(grid.v_set_pu, wanted[1]))
-    found: list[tuple[Choice | None, ...]] = []
-    for t, terminal in enumerate(case.points.terminals):
-        if terminal.load_side:
-            found.append((None, None))
-            continue
-
-        def best(only_v: int | None, t: int = t) -> Choice | None:
-            sample = Sample(
-                opens=training.opens[t],
-                stiff=training.stiff[t],
-                trials=int(training.reachable[t]),
-                front=training.front[t],
-            )
-            answer = choose(grid, sample, case.study.certificate.margin, wanted, only_v)
-            return answer if isinstance(answer, Choice) else None
-
-        found.append((best(None), best(int(at_reference_v[0])) if at_reference_v.size else None))
-    return found
+# ---- choosing ----
 
 
-def as_settings(case: Case, choice: Choice | None) -> Settings | None:
-    """The detector's settings of a choice."""
-    if choice is None:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Chosen:
+    """What training found for one terminal in one group."""
+
+    best: Choice | Refusal
+    at_reference_v: Choice | Refusal | None  #: None: the device has no such V_set
+    front: Front  #: of the events the choice keeps its margin to
+    groups: tuple[Case, ...]  #: in which it is to serve
+
+
+def one_for_all(cases: Sequence[Case]) -> bool:
+    """Whether one setting of a terminal serves all groups."""
+    return cases[0].study.network.settings == "one"
+
+
+def choices(
+    cases: Sequence[Case], grid: Grid, trainings: Sequence[Training]
+) -> list[list[Chosen | None]]:
+    """Per group and terminal the best settings; None where the terminal is not judged."""
+    if not one_for_all(cases):
+        return [
+            [
+                _choose(grid, [case], [training], t) if judged else None
+                for t, judged in enumerate(case.judged)
+            ]
+            for case, training in zip(cases, trainings, strict=True)
+        ]
+    common = [
+        _choose(grid, cases, trainings, t) if any(case.judged[t] for case in cases) else None
+        for t in range(len(cases[0].points.terminals))
+    ]
+    return [
+        [own if judged else None for own, judged in zip(common, case.judged, strict=True)]
+        for case in cases
+    ]
+
+
+def _choose(grid: Grid, cases: Sequence[Case], trainings: Sequence[Training], t: int) -> Chosen:
+    """The best setting of terminal ``t`` for all of these groups together."""
+    sample = pool([_sample(*pair, t) for pair in zip(cases, trainings, strict=True)])
+    window = common_window(cases, t)
+    study = cases[0].study
+    reference = reference_settings(study)
+    wanted = (reference.i_set_a, reference.v_set_pu, reference.z_set_ohm)
+    margin = study.certificate.margin
+    same_v = np.flatnonzero(np.isclose(grid.v_set_pu, reference.v_set_pu))
+    return Chosen(
+        best=choose(grid, sample, margin, wanted, window=window),
+        at_reference_v=choose(grid, sample, margin, wanted, int(same_v[0]), window)
+        if same_v.size
+        else None,
+        front=sample.front,
+        groups=tuple(cases),
+    )
+
+
+def _sample(case: Case, training: Training, t: int) -> Sample:
+    # on the load side a relay with one setting for all groups may trip falsely, and finds nothing
+    blind = case.points.terminals[t].load_side
+    return Sample(
+        opens=training.opens[t],
+        stiff=training.stiff[t],
+        trials=0 if blind else int(training.reachable[t]),
+        front=training.front[t],
+    )
+
+
+def as_settings(study: Study, choice: Choice | Refusal | None) -> Settings | None:
+    """The detector's settings of a choice; None where there is none."""
+    if not isinstance(choice, Choice):
         return None
     return Settings(
         i_set_a=choice.i_set_a,
         v_set_pu=choice.v_set_pu,
         z_set_ohm=choice.z_set_ohm,
-        negative_sign=case.study.detector.negative_sign,
+        options=options_of(study),
+    )
+
+
+def reference_settings(study: Study) -> Settings:
+    """The study's reference as the detector's settings."""
+    return Settings(
+        i_set_a=study.reference.i_set_a,
+        v_set_pu=float(Fraction(str(study.reference.v_set_pct)) / 100),
+        z_set_ohm=study.reference.z_set_ohm,
+        options=options_of(study),
     )

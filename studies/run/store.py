@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...model.errors import OpenPhaseError
 
-__all__ = ["RunFolder", "as_json", "npz", "pack", "unpack", "write_whole"]
+__all__ = ["RunFolder", "as_json", "block_array", "npz", "pack", "unpack", "write_whole"]
 
 T = TypeVar("T")
 
@@ -96,6 +96,15 @@ def unpack(kind: type[T], flat: dict[str, NDArray[Any]], name: str = "") -> T:
 def _length(flat: dict[str, NDArray[Any]], name: str) -> int:
     heads = {key[len(name) + 1 :].split(".", 1)[0] for key in flat if key.startswith(name + ".")}
     return len(heads)
+
+
+def block_array(path: Path, name: str) -> NDArray[Any] | None:
+    """One array of a stored block; None where the file is damaged, or has no such array."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return np.asarray(file[name])
+    except DAMAGED:
+        return None
 
 
 #: what a run leaves behind, beside its blocks; nothing else is ever removed

@@ -13,7 +13,7 @@ from ...model.parts import Feeder
 from .feeder_layout import FeederLayout, Mark, Tie, lay_out
 from .figures import TALLEST, axes_or_new, house_style, png_of, save_figure, save_png
 from .sheet import setting_text
-from .views import Bar, Cloud, EvidenceView, OverviewView, ProfileView, Setting
+from .views import Bar, Cloud, EvidenceView, Family, OverviewView, ProfileView, Setting
 
 __all__ = [
     "plot_evidence",
@@ -31,14 +31,17 @@ Real = NDArray[np.float64]
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
 SKY, YELLOW, GREY = "#56B4E9", "#F0E442", "#777777"
 
-CLASSES: dict[tuple[str, str], tuple[str, str, str]] = {
-    ("open_inside", "inside"): ("break inside: must trip", BLUE, "o"),
-    ("load_step", "inside"): ("load step inside", ORANGE, "s"),
-    ("load_step", "outside"): ("load step outside", RED, "^"),
-    ("source_step", "outside"): ("source step", GREEN, "D"),
-    ("open_outside", "outside"): ("break outside", PURPLE, "v"),
+FAMILIES: dict[Family, tuple[str, str]] = {
+    Family.INSIDE: (BLUE, "o"),
+    Family.OUTSIDE: (PURPLE, "v"),
+    Family.LOAD: (ORANGE, "s"),
+    Family.SOURCE: (GREEN, "D"),
+    Family.FAULT: (RED, "^"),
+    Family.SWITCHING: (SKY, "p"),
+    Family.DER: (YELLOW, "h"),
+    Family.PAIR: (GREY, "X"),
 }
-"""Name and side of a class -> its words, colour and marker."""
+"""Colour and marker of each family of classes."""
 
 SECTION_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
 CROWDED = 24  #: units beyond which a schematic shows their names only
@@ -75,9 +78,9 @@ def plot_evidence(view: EvidenceView, ax: Axes | None = None) -> Axes:
 
 
 def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch:
-    """Draw one class; what cannot trip is faint and hollow. Returns its legend entry."""
-    text, colour, marker = CLASSES[cloud.name, cloud.side]
-    must_trip = cloud.name == "open_inside"
+    """Draw one family; what cannot trip is faint and hollow. Returns its legend entry."""
+    colour, marker = FAMILIES[cloud.family]
+    must_trip = cloud.family == Family.INSIDE
     size = 24 if must_trip else 13
     x = np.clip(cloud.di1_a, low[0] * 1.04, high[0] / 1.04)
     y = np.clip(cloud.z1_ohm, low[1] * 1.05, high[1] / 1.05)
@@ -112,12 +115,14 @@ def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch
         marker=marker,
         color=colour,
         markersize=5,
-        label=f"{text} ({able} of {x.size} shown can trip)",
+        label=f"{cloud.family} ({able} of {x.size} shown can trip)",
     )
 
 
 def _draw_borders(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
     """Draw the staircase of the training sample, as it is and with the demanded margin."""
+    if view.border is None or view.margin_border is None:
+        return []
     floor = view.limits_a[0], view.limits_ohm[0]
     x, y = (np.maximum(own, low) for own, low in zip(view.border, floor, strict=True))
     ax.fill_between(x, y, floor[1], color="#d9b38c", alpha=0.28, lw=0, zorder=1)
@@ -250,7 +255,7 @@ def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
     ax.set_title("Breaks found, with intervals; right of each bar its false trips, k of n events")
     handles = [
         Patch(facecolor=colour, edgecolor="white", hatch=hatch, label=name)
-        for name, (colour, hatch) in zip(view.names, OVERVIEW, strict=True)
+        for name, (colour, hatch) in zip(view.names, OVERVIEW, strict=False)
     ]
     below = -0.55 / (0.95 * len(view.terminals))
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, below), ncols=3)

@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
 from ...detector.criteria import Reason
 from ...optimise.staircase import Front
+from ..run.cases import Case
 from ..run.certify import Validation
-from ..run.draw import Case
+from ..run.classes import DrawClass
 from ..run.spec import Study
 from ..run.store import RunFolder
+from .assumptions import assumptions
 from .html_parts import (
     bound_text,
-    bullets,
     class_trips_cell,
     dependability_text,
-    ends,
     false_trips_cell,
     interval_text,
     k_of_n,
     margin_text,
     percent,
     picture,
-    range_text,
     right_cell,
     setting_cell,
     table,
 )
-from .sheet import setting_text, terminal_name
+from .sheet import class_words, row_name, setting_text
 from .views import evidence_view, overview_view, profile_view
 
 __all__ = ["report_html", "write_report"]
@@ -45,14 +45,15 @@ STATUS = {
 }
 """Status -> what it means."""
 
-CLASSES = {
-    "open_inside": "open phase on the section's path",
-    "load_step": "load step",
-    "source_step": "source voltage step",
-    "open_outside": "open phase elsewhere",
-    "open_lateral": "open phase on a lateral of the section",
-    "open_three": "three phases open",
-}
+MARKS = (
+    "Each mark is one event of the validation sample, by its positive sequence. Whatever is in "
+    "full colour trips every setting to its lower left."
+)
+BORDERS = (
+    "The brown region is built from all of the training sample, phases that stand in among it: a "
+    "setting in it trips falsely there. A setting beyond the dashed line keeps the demanded "
+    "margin, in V_set as well."
+)
 KINDS = {"must_trip": "must trip", "must_not_trip": "must not trip", "apart": "in neither count"}
 
 STYLE = """\
@@ -83,41 +84,46 @@ dd { margin: 0 0 .3em 9em; }
 
 def write_report(
     result: dict[str, Any],
-    case: Case,
-    fronts: tuple[Front, ...],
-    validation: Validation,
+    cases: Sequence[Case],
+    fronts: Sequence[Sequence[Front]] | None,
+    validations: Sequence[Validation],
     folder: RunFolder,
 ) -> None:
-    """Draw the pictures of a finished sizing and write them and ``report.html``.
+    """Draw the pictures of a finished run and write them and ``report.html``.
 
     Parameters
     ----------
     result
-        What ``size --json`` prints.
-    case
-        The feeder and study.
+        What ``size --json`` or ``assess --json`` prints.
+    cases
+        The feeder and study, per group.
     fronts
-        Per terminal, the training events that no other outdoes.
-    validation
-        The validation sample.
+        Per group and terminal, the training events that no other outdoes; None: no training.
+    validations
+        The validation sample of each group.
     folder
         Where the report goes.
     """
     # matplotlib takes half a second to import: only a run that got here pays for it
     from .plots import plot_evidence, plot_feeder, plot_overview, plot_profile, png_of  # noqa: PLC0415
 
-    pictures = {"feeder.png": png_of(plot_feeder, case.feeder)}
+    pictures = {"feeder.png": png_of(plot_feeder, cases[0].feeder)}
     if result["compared"]:
         pictures["overview.png"] = png_of(plot_overview, overview_view(result))
-    for t, row in enumerate(result["sections"]):
+    terminals = len(cases[0].points.terminals)
+    for n, row in enumerate(result["sections"]):
         if row["classes"]:
-            evidence, profile = _picture_names(t, row)
-            view = evidence_view(case, t, row, fronts[t], validation)
+            group, t = divmod(n, terminals)
+            front = None if fronts is None else fronts[group][t]
+            evidence, profile = _picture_names(n, row)
+            view = evidence_view(cases[group], t, row, front, validations[group])
             pictures[evidence] = png_of(plot_evidence, view)
-            pictures[profile] = png_of(plot_profile, profile_view(case, t, validation))
+            pictures[profile] = png_of(
+                plot_profile, profile_view(cases[group], t, validations[group])
+            )
     for name, png in pictures.items():
         folder.write(name, png)
-    folder.write("report.html", report_html(result, case.study, pictures))
+    folder.write("report.html", report_html(result, cases[0].study, pictures))
 
 
 def _picture_names(t: int, row: dict[str, Any]) -> tuple[str, str]:
@@ -128,7 +134,8 @@ def _picture_names(t: int, row: dict[str, Any]) -> tuple[str, str]:
 
 def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]) -> str:
     """The page; ``pictures`` are embedded by their names."""
-    title = f"Open-phase settings for feeder {result['feeder']}"
+    what = "Assessment of open-phase settings" if "assessed" in result else "Open-phase settings"
+    title = f"{what} for feeder {result['feeder']}"
     parts = [
         f"<h1>{escape(title)}</h1>",
         _head(result, study),
@@ -137,11 +144,11 @@ def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]
         picture("feeder.png", "schematic of the feeder", "The feeder and its sections.", pictures),
         _comparison(result, pictures),
         *(
-            _terminal(t, row, study, pictures)
-            for t, row in enumerate(result["sections"])
+            _terminal(n, row, result, pictures)
+            for n, row in enumerate(result["sections"])
             if row["classes"]
         ),
-        _assumptions(result, study),
+        assumptions(result, study),
         f"<footer><p>openphase {escape(result['version'])}; inputs, versions and hashes are in "
         "manifest.json, every default in study.toml, all numbers in result.json.</p></footer>",
     ]
@@ -156,6 +163,11 @@ def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]
 # ---- parts of the page ----
 
 
+def _name(row: dict[str, Any], result: dict[str, Any]) -> str:
+    """A row's terminal, with its group where the study has several."""
+    return row_name(row, len({own["setting_group"] for own in result["sections"]}) > 1)
+
+
 def _head(result: dict[str, Any], study: Study) -> str:
     demand = study.certificate
     known = {"find": demand.find_at_least, "margin": demand.margin}
@@ -163,12 +175,14 @@ def _head(result: dict[str, Any], study: Study) -> str:
         f"<dt>{status}</dt><dd>{escape(text.format(**known))}{_tally(result, status)}</dd>"
         for status, text in STATUS.items()
     )
-    return (
+    assessed = result.get("assessed", {})
+    note = f'<p class="bad">Note: {escape(assessed["note"])}.</p>\n' if assessed.get("note") else ""
+    return note + (
         f"<p>Seed {result['seed']}, attempt {result['attempt']}, at least "
         f"{result['scenarios']:,} scenarios of every class and side. The false-trip bounds of all "
         f"terminals (for each its worst class) hold together at "
         f"{percent(result['confidence'], 0)} confidence, over all attempts; so do, apart from "
-        f"them, the dependability intervals of the chosen settings. The "
+        f"them, the dependability intervals of these settings. The "
         f"target is at most {bound_text(demand.target)} false trips per event.</p>\n"
         f"<h3>What the status words mean</h3>\n<dl>\n{words}\n</dl>"
     )
@@ -187,14 +201,14 @@ def _sheet(result: dict[str, Any]) -> str:
     rows = []
     for row in result["sections"]:
         cells = [
-            f'<th class="w">{escape(terminal_name(row))}</th>',
+            f'<th class="w">{escape(_name(row, result))}</th>',
             f'<td class="w">{escape(row["status"])}</td>',
         ]
         cells += [
             setting_cell(row["i_set_a"]),
             setting_cell(row["v_set_pu"], 100.0),
             setting_cell(row["z_set_ohm"]),
-            right_cell(margin_text(row)),
+            right_cell("–" if "assessed" in result else margin_text(row)),
             right_cell(dependability_text(row)),
             right_cell(k_of_n(row["unreachable"], row["opens"])),
             false_trips_cell(row["false_trips"], row["security_trials"]),
@@ -217,10 +231,11 @@ def _comparison(result: dict[str, Any], pictures: dict[str, bytes]) -> str:
         "terminal", "setting", "#I_set A", "#V_set %", "#Z_set Ω", "#found", "#interval",
         "#false trips", "#bound",
     )  # fmt: skip
+    names = dict.fromkeys(row["name"] for row in result["compared"])
     rows = []
     for row in result["compared"]:
         cells = [
-            f'<th class="w">{escape(terminal_name(row))}</th>',
+            f'<th class="w">{escape(_name(row, result))}</th>',
             f'<td class="w">{escape(row["name"])}</td>',
         ]
         if row["i_set_a"] is None:
@@ -237,20 +252,22 @@ def _comparison(result: dict[str, Any], pictures: dict[str, bytes]) -> str:
         ]
         rows.append("".join(cells))
     return (
-        "<h2>Chosen settings beside others</h2>\n<p>All on the same validation sample: the chosen "
-        "setting, the best one at the reference's V_set, and the reference.</p>\n"
+        "<h2>Settings side by side</h2>\n<p>All on the same validation sample: "
+        f"{', '.join(escape(name) for name in names)}.</p>\n"
         + table(head, rows)
         + picture("overview.png", "dependability and false trips of every terminal", "", pictures)
     )
 
 
-def _terminal(t: int, row: dict[str, Any], study: Study, pictures: dict[str, bytes]) -> str:
-    evidence, profile = _picture_names(t, row)
+def _terminal(
+    n: int, row: dict[str, Any], result: dict[str, Any], pictures: dict[str, bytes]
+) -> str:
+    evidence, profile = _picture_names(n, row)
     head = ("class", "side", "kind", "#trials", "#effective trials", "#trips", "#upper bound")
     rows = [
         "".join(
             [
-                f"<td>{escape(CLASSES.get(own['name'], own['name']))}</td>",
+                f"<td>{escape(_class_name(own))}</td>",
                 f'<td>{escape(own["side"])}</td><td class="w">{KINDS[own["kind"]]}</td>',
                 right_cell(f"{own['trials']:,}"),
                 right_cell(k_of_n(own["effective_trials"], own["trials"])),
@@ -265,21 +282,18 @@ def _terminal(t: int, row: dict[str, Any], study: Study, pictures: dict[str, byt
     return "\n".join(
         [
             '<section class="terminal">',
-            f"<h2>Terminal {escape(terminal_name(row))}: {escape(row['status'])}</h2>",
+            f"<h2>Terminal {escape(_name(row, result))}: {escape(row['status'])}</h2>",
             f"<p>{_setting(row)} Line between the points: |Z1| = {abs(z1):.2f} Ω.</p>",
             f"<p>{escape(row['reason'][:1].upper() + row['reason'][1:])}.</p>",
             table(head, rows),
             '<p class="faint">Effective trials come near the thresholds: |ΔI1| > I_set/2 and '
             "|ΔV1| ≤ V_set. Where they are few, no trips show little.</p>",
-            _causes(row, study),
+            _causes(row),
             _nearest(row),
             picture(
                 evidence,
                 f"evidence of {row['local']} to {row['remote']}",
-                "Each mark is one event of the validation sample. Whatever is in full colour "
-                "trips every setting to its lower left. The brown region is built from all of the "
-                "training sample: a setting in it trips falsely there. A setting beyond the dashed "
-                "line keeps the demanded margin, in V_set as well.",
+                MARKS if "assessed" in result else f"{MARKS} {BORDERS}",
                 pictures,
             ),
             picture(
@@ -294,17 +308,24 @@ def _terminal(t: int, row: dict[str, Any], study: Study, pictures: dict[str, byt
     )
 
 
+def _class_name(own: dict[str, Any]) -> str:
+    """A class in words; of wrong wiring, how often the alarm was raised."""
+    alarms = f" (alarm in {own['alarms']:,})" if "alarms" in own else ""
+    return class_words(own) + alarms
+
+
 def _setting(row: dict[str, Any]) -> str:
     if row["i_set_a"] is None:
         return "No setting."
+    margin = "" if row["margin"] is None else f", margin {margin_text(row)}"
     return (
         f"I_set {setting_text(row['i_set_a'])} A ({setting_text(row['i_set_pu'])} pu), "
         f"V_set {setting_text(row['v_set_pu'] * 100.0)} %, "
-        f"Z_set {setting_text(row['z_set_ohm'])} Ω, margin {margin_text(row)}."
+        f"Z_set {setting_text(row['z_set_ohm'])} Ω{margin}."
     )
 
 
-def _causes(row: dict[str, Any], study: Study) -> str:
+def _causes(row: dict[str, Any]) -> str:
     if row["detected"] is None:
         return ""
     missed = row["opens"] - row["unreachable"] - row["detected"]
@@ -315,7 +336,7 @@ def _causes(row: dict[str, Any], study: Study) -> str:
         f"{percent(cause['share'])} {escape(Reason[cause['criterion'].upper()].text)}"
         for cause in row["causes"]
     ]
-    sign = "" if study.detector.negative_sign else " (the sign is not used)"
+    sign = "" if row["negative_sign"] else " (the sign is not used)"
     return f"{begin}; the first criterion that failed{sign}: {'; '.join(found)}.</p>"
 
 
@@ -323,52 +344,8 @@ def _nearest(row: dict[str, Any]) -> str:
     near = row["nearest_false_trip"]
     if near is None:
         return ""
-    name = CLASSES.get(near["class"], near["class"].replace("_", " "))
+    name = DrawClass[near["class"].upper()].words
     return (
         f"<p><b>Nearest false trip</b> in training: {escape(name)}, at factor "
         f"{near['factor']:.2f}; scenario <code>{escape(near['scenario'])}</code>.</p>"
-    )
-
-
-def _assumptions(result: dict[str, Any], study: Study) -> str:
-    loads, step, noise = study.loads, study.load_step, study.instruments
-    transformers = study.transformers
-    units = ", ".join(transformers.yg_d) or "none"
-    closed = study.network.closed
-    switches = (
-        "as in the feeder file"
-        if closed is None
-        else f"closed: {', '.join(closed) or 'none'}; all others open"
-    )
-    numerics = result["numerics"]
-    stated = [
-        f"Noise: each phasor of V and I, per phase and frame, has a complex random error, normal "
-        f"with a standard deviation of a third of its bound per axis, truncated at the bound: TVE "
-        f"{noise.tve_pct:g} % of the phasor, for currents at least {noise.current_floor_a:g} A.",
-        f"Loads: common level {range_text(loads.level)} times {range_text(loads.each)} for each; "
-        f"voltage exponent {range_text(loads.exponent)} common to all, each within "
-        f"±{loads.exponent_spread:g} of it; constant impedance below 0.7 pu.",
-        f"Transformers that may be Yg/D, in this order: {units}; how many: "
-        f"{transformers.yg_d_count[0]} to {transformers.yg_d_count[1]}.",
-        f"Switches: {switches}.",
-        f"Between the two frames every scenario also has a source change within "
-        f"±{study.ambient.source_pct:g} % and a change of each load within "
-        f"±{study.ambient.load_pct:g} %.",
-        f"Load steps: {range_text(step.kw)} kW on or off, {percent(step.single_phase_share, 0)} of "
-        f"them single-phase. Source steps: {range_text(study.source_step.pct)} %. Breaks: uniform "
-        f"in length, {percent(study.open_phase.two_phase_share, 0)} of them two phases, else one.",
-        f"Device: I_set {range_text(ends(study.device.i_grid()))} A, Z_set "
-        f"{range_text(ends(study.device.z_grid()))} Ω, V_set "
-        f"{', '.join(map(setting_text, study.device.v_set_pct))} %; sign of Re Z1 "
-        f"{'used' if study.detector.negative_sign else 'not used'}.",
-    ]
-    solved = (
-        "Numerics: what an opened conductor leads to is dead (nothing connected, or no source) in "
-        f"{numerics['dead']:,} validation scenarios and floating in {numerics['floating']:,}; "
-        f"{numerics['not_converged']:,} did not converge."
-    )
-    missing = bullets(result["feeder_false_trips"]["assumptions"])
-    return (
-        "<h2>Assumptions</h2>\n<p>The bounds hold for events drawn as follows, and for no "
-        f"others.</p>\n{bullets([*stated, solved])}\n<h3>Not built yet</h3>\n{missing}"
     )

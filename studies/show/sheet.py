@@ -9,8 +9,13 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
+from ..run.classes import REPORTED
+
 __all__ = [
     "PAGE",
+    "Row",
+    "class_words",
+    "row_name",
     "setting_text",
     "settings_csv",
     "sheet_table",
@@ -21,6 +26,9 @@ __all__ = [
 
 PAGE = 100  #: columns of everything that is printed for people
 GAP = "  "
+MOST_CLASSES = 6  #: classes with trips that are listed per terminal
+
+WORDS = {(own.name, own.side): own.words for own in REPORTED}
 
 
 def terminal_name(row: dict[str, Any]) -> str:
@@ -53,53 +61,162 @@ def settings_csv(result: dict[str, Any]) -> str:
 
 
 def sheet_table(result: dict[str, Any]) -> str:
-    """The sheet in at most 100 columns, the reasons and the comparison under it."""
-    lines = [
-        *wrapped(
-            f"{result['feeder']}: settings, seed {result['seed']}, attempt {result['attempt']}; "
-            "false-trip bounds of all terminals together at "
-            f"{result['confidence']:.0%} confidence"
-        ),
-        "",
-        *table_lines(
-            ("terminal", "status"),
-            ("I_set A", "V_set %", "Z_set Ω", "margin", "found", "false trips", "bound"),
-            [_setting_row(row) for row in result["sections"]],
-        ),
-        "",
-    ]
+    """The sheet in at most 100 columns, by group; the classes and the comparison under it."""
+    rows = result["sections"]
+    lines = _title(result)
+    for group, own in _by_group(rows):
+        lines += ["", *_group_head(group, rows), *_setting_table(own, "assessed" in result)]
+    lines += ["", *_legend(rows)]
+    several = len(_by_group(rows)) > 1
+    blocks = {
+        "false trips by class": [(row, _false_trips(row)) for row in rows],
+        "reasons": [(row, _reservation(row)) for row in rows],
+    }
+    for title, texts in blocks.items():
+        said = [
+            line
+            for row, text in texts
+            if text
+            for line in wrapped(f"{GAP}{row_name(row, several)}: {text}")
+        ]
+        if said:
+            lines += ["", title, *said]
+    lines += _apart(rows)
+    if {row["name"] for row in result["compared"]} - {"assessed"}:
+        lines += ["", *_comparison(result["compared"], several)]
+    return "\n".join(lines)
+
+
+def row_name(row: dict[str, Any], several: bool) -> str:
+    """A row's terminal, with its group where there are ``several``."""
+    return f"{terminal_name(row)} {row['setting_group']}" if several else terminal_name(row)
+
+
+def _by_group(rows: list[dict[str, Any]]) -> list[tuple[str, list[dict[str, Any]]]]:
+    names = dict.fromkeys(row["setting_group"] for row in rows)
+    return [(name, [row for row in rows if row["setting_group"] == name]) for name in names]
+
+
+def _title(result: dict[str, Any]) -> list[str]:
+    """What the sheet is, and what has to be said of where its settings come from."""
+    assessed = result.get("assessed")
+    what = f"assessment of {assessed['settings']}" if assessed else "settings"
+    lines = wrapped(
+        f"{result['feeder']}: {what}, seed {result['seed']}, attempt {result['attempt']}; "
+        f"false-trip bounds of all terminals together at {result['confidence']:.0%} confidence"
+    )
+    return lines + (wrapped(f"note: {assessed['note']}") if assessed and assessed["note"] else [])
+
+
+def _group_head(name: str, rows: list[dict[str, Any]]) -> list[str]:
+    return wrapped(f"setting group {name}") if len(_by_group(rows)) > 1 else []
+
+
+def _setting_table(rows: list[dict[str, Any]], assessed: bool) -> list[str]:
+    """The settings and what they are worth; what is assessed has no margin that is known."""
+    heads: tuple[str, ...] = (
+        "I_set A",
+        "V_set %",
+        "Z_set Ω",
+        "margin",
+        "found",
+        "false trips",
+        "bound",
+    )
+    cells = [_setting_row(row) for row in rows]
+    if assessed:
+        at = heads.index("margin")
+        heads = heads[:at] + heads[at + 1 :]
+        cells = [
+            (keys, own if isinstance(own, str) else (*own[:at], *own[at + 1 :]))
+            for keys, own in cells
+        ]
+    return table_lines(("terminal", "status"), heads, cells)
+
+
+def _legend(rows: list[dict[str, Any]]) -> list[str]:
+    several = len(_by_group(rows)) > 1
     blind = ", ".join(
-        f"{terminal_name(row)} {row['unreachable']} of {row['opens']}"
-        for row in result["sections"]
+        f"{row_name(row, several)} {row['unreachable']} of {row['opens']}"
+        for row in rows
         if row["unreachable"]
     )
-    lines += wrapped(
+    lines = wrapped(
         "found: internal breaks with something connected beyond them. Breaks with nothing "
         f"beyond them cannot be seen: {blind or 'none'}."
     )
-    lines += wrapped(
-        "bound: upper bound of the probability of a false trip in one event, worst class. "
-        "It covers load steps, source steps and breaks elsewhere; report.html says what it "
-        "does not cover."
-    )
-    reasons = [
-        line
-        for row in result["sections"]
-        if (reason := _reservation(row))
-        for line in wrapped(f"{GAP}{terminal_name(row)}: {reason}")
+    bounded = [
+        (own["upper"], row, own)
+        for row in rows
+        for own in row["classes"]
+        if own["kind"] == "must_not_trip" and own["upper"] is not None
     ]
-    if reasons:
-        lines += ["", "reasons", *reasons]
-    if result["compared"]:
-        lines += [
-            "",
-            *table_lines(
-                ("compared", "setting"),
-                ("I_set A", "V_set %", "Z_set Ω", "found (interval)", "false trips", "bound"),
-                [_compared_row(row) for row in result["compared"]],
-            ),
-        ]
-    return "\n".join(lines)
+    kinds = {(own["name"], own["side"]) for _, _, own in bounded}
+    worst = ""
+    if bounded:
+        _, row, own = max(bounded, key=lambda item: item[0])
+        worst = f" Here the worst is {class_words(own)} at {row_name(row, several)}."
+    return lines + wrapped(
+        "bound: upper bound of the probability of a false trip in one event, the worst of "
+        f"{len(kinds)} classes and sides that must not trip.{worst} report.html lists them all, "
+        "and what they do not cover."
+    )
+
+
+def class_words(own: dict[str, Any]) -> str:
+    """A class of a result in a reader's words, in the plural."""
+    return WORDS.get((own["name"], own["side"]), f"{own['name']} {own['side']}")
+
+
+def _false_trips(row: dict[str, Any]) -> str:
+    """The classes in which a setting trips falsely, the highest rate first."""
+    bad = [own for own in row["classes"] if own["kind"] == "must_not_trip" and own["trips"]]
+    bad.sort(key=lambda own: -own["trips"] / own["trials"])
+    said = [f"{own['trips']} of {own['trials']} {class_words(own)}" for own in bad[:MOST_CLASSES]]
+    more = len(bad) - MOST_CLASSES
+    return ", ".join([*said, f"and {more} more classes"] if more > 0 else said)
+
+
+def _apart(rows: list[dict[str, Any]]) -> list[str]:
+    """What is in neither count, inside the sections: shares of all terminals together."""
+    trips: dict[str, list[int]] = {}
+    alarms = [0, 0]
+    for row in rows:
+        for own in row["classes"]:
+            if own["kind"] != "apart" or own["trips"] is None:
+                continue
+            if "alarms" in own:
+                alarms = [alarms[0] + own["alarms"], alarms[1] + own["trials"]]
+            elif own["side"] == "inside":
+                total = trips.setdefault(class_words(own), [0, 0])
+                total[0], total[1] = total[0] + own["trips"], total[1] + own["trials"]
+    said = [f"{name} {_whole_percent(k, n)} of {n}" for name, (k, n) in trips.items()]
+    lines = wrapped(f"told apart, share that trips: {', '.join(said)}.") if said else []
+    if alarms[1]:
+        share = _whole_percent(*alarms)
+        lines += wrapped(f"wiring faults: {share} of {alarms[1]} raise the alarm.")
+    return ["", *lines] if lines else []
+
+
+def _whole_percent(k: int, n: int) -> str:
+    """A share in percent, 0 and 100 only where it is that.
+
+    Examples
+    --------
+    >>> _whole_percent(0, 9), _whole_percent(1, 900), _whole_percent(899, 900), _whole_percent(9, 9)
+    ('0 %', '1 %', '99 %', '100 %')
+    """
+    if k in (0, n):
+        return "100 %" if k else "0 %"
+    return f"{min(max(round(100 * k / n), 1), 99)} %"
+
+
+def _comparison(rows: list[dict[str, Any]], several: bool) -> list[str]:
+    return table_lines(
+        ("compared", "setting"),
+        ("I_set A", "V_set %", "Z_set Ω", "found (interval)", "false trips", "bound"),
+        [_compared_row(row, several) for row in rows],
+    )
 
 
 Row = tuple[Sequence[str], Sequence[str] | str]
@@ -158,8 +275,8 @@ def _setting_row(row: dict[str, Any]) -> Row:
     )
 
 
-def _compared_row(row: dict[str, Any]) -> Row:
-    keys = (terminal_name(row), row["name"].replace("reference V_set", "ref. V_set"))
+def _compared_row(row: dict[str, Any], several: bool) -> Row:
+    keys = (row_name(row, several), row["name"].replace("reference V_set", "ref. V_set"))
     if row["i_set_a"] is None:
         return keys, row["reason"]
     reachable = row["opens"] - row["unreachable"]

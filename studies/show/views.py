@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,9 @@ from numpy.typing import NDArray
 from ...optimise.certificate import two_sided
 from ...optimise.staircase import Front, border
 from ..run.along import path_starts
-from ..run.certify import COMPARED, Validation
-from ..run.classes import REPORTED
-from ..run.draw import Case
+from ..run.cases import Case
+from ..run.certify import Validation
+from ..run.classes import REPORTED, DrawClass, reported_row
 from ..run.tally import PLACES
 from .sheet import terminal_name
 
@@ -22,6 +23,7 @@ __all__ = [
     "Bar",
     "Cloud",
     "EvidenceView",
+    "Family",
     "OverviewView",
     "ProfileView",
     "Setting",
@@ -44,12 +46,47 @@ class Setting:
     z_set_ohm: float
 
 
+class Family(StrEnum):
+    """Classes that share a colour, in a reader's words."""
+
+    INSIDE = "break inside: must trip"
+    OUTSIDE = "break elsewhere"
+    LOAD = "load, capacitor or motor step"
+    SOURCE = "source step or regulator tap"
+    FAULT = "fault"
+    SWITCHING = "tie switching, transfer, energisation, reclosing"
+    DER = "DER trip or ramp"
+    PAIR = "two at once"
+
+
+FAMILY = {
+    DrawClass.OPEN_PHASE: Family.OUTSIDE,
+    DrawClass.LOAD_STEP: Family.LOAD,
+    DrawClass.CAPACITOR_STEP: Family.LOAD,
+    DrawClass.MOTOR_START: Family.LOAD,
+    DrawClass.SOURCE_STEP: Family.SOURCE,
+    DrawClass.REGULATOR_TAP: Family.SOURCE,
+    DrawClass.EARTH_FAULT: Family.FAULT,
+    DrawClass.LINE_FAULT: Family.FAULT,
+    DrawClass.TIE_SWITCHING: Family.SWITCHING,
+    DrawClass.TRANSFER: Family.SWITCHING,
+    DrawClass.ENERGISATION: Family.SWITCHING,
+    DrawClass.RECLOSING: Family.SWITCHING,
+    DrawClass.DER_TRIP: Family.DER,
+    DrawClass.DER_RAMP: Family.DER,
+    DrawClass.OPEN_WITH_LOAD_STEP: Family.PAIR,
+    DrawClass.OPEN_WITH_DER_TRIP: Family.PAIR,
+    DrawClass.LOAD_SWAP: Family.PAIR,
+    DrawClass.STEP_WITH_TAP: Family.PAIR,
+}
+"""Of every class that may count as a false trip."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cloud:
-    """The sampled events of one class."""
+    """The sampled events of one family of classes."""
 
-    name: str
-    side: str
+    family: Family
     di1_a: Real
     z1_ohm: Real
     able: NDArray[np.bool_]  #: the sign and this V_set let it trip
@@ -63,8 +100,8 @@ class EvidenceView:
     v_set_pu: float
     negative_sign: bool
     clouds: tuple[Cloud, ...]
-    border: tuple[Real, Real]  #: of the settings that trip falsely
-    margin_border: tuple[Real, Real]  #: of those that do not keep the demanded margin
+    border: tuple[Real, Real] | None  #: of the settings that trip falsely; None: no training
+    margin_border: tuple[Real, Real] | None  #: of those that do not keep the demanded margin
     margin: float
     chosen: Setting | None
     reference: Setting
@@ -114,7 +151,7 @@ class OverviewView:
 
 
 def evidence_view(
-    case: Case, t: int, row: dict[str, Any], front: Front, validation: Validation
+    case: Case, t: int, row: dict[str, Any], front: Front | None, validation: Validation
 ) -> EvidenceView:
     """What the evidence picture of terminal ``t`` shows; ``row`` is its part of the result."""
     study = case.study
@@ -137,8 +174,8 @@ def evidence_view(
         v_set_pu=v_set_pu,
         negative_sign=study.detector.negative_sign,
         clouds=clouds,
-        border=border(front, v_set_pu),
-        margin_border=border(front, v_set_pu, margin),
+        border=None if front is None else border(front, v_set_pu),
+        margin_border=None if front is None else border(front, v_set_pu, margin),
         margin=margin,
         chosen=chosen,
         reference=reference,
@@ -152,16 +189,18 @@ def evidence_view(
 def _clouds(
     validation: Validation, t: int, v_set_pu: float, negative_sign: bool
 ) -> tuple[Cloud, ...]:
-    """The kept sample of terminal ``t`` by class, what must trip last, on top."""
+    """The kept sample of terminal ``t`` by family, what must trip last, on top."""
+    found: defaultdict[Family, list[Real]] = defaultdict(list)
+    for which, sample, side in validation.samples:
+        rows = reported_row(which.drawn)[side[t]]
+        for r in np.unique(rows[rows >= 0]):
+            kind = REPORTED[r].kind
+            if kind != "apart":
+                family = Family.INSIDE if kind == "must_trip" else FAMILY[which.drawn]
+                found[family].append(sample[t][:, rows == r])
     clouds = []
-    for own in sorted(REPORTED, key=lambda own: own.kind == "must_trip"):
-        if own.kind == "apart":
-            continue
-        parts = [
-            sample[t][:, np.isin(side[t], own.where)]
-            for which, sample, side in validation.samples
-            if which.drawn == own.drawn
-        ]
+    for family in (*list(Family)[1:], Family.INSIDE):
+        parts = found[family]
         di1_a, dv1_pu, real, imag = np.concatenate([np.empty((4, 0)), *parts], axis=1)
         able = (dv1_pu <= v_set_pu) & ((real != 0.0) | (imag != 0.0))
         if negative_sign:
@@ -169,8 +208,7 @@ def _clouds(
         if di1_a.size:
             clouds.append(
                 Cloud(
-                    name=own.name,
-                    side=own.side,
+                    family=family,
                     di1_a=di1_a,
                     z1_ohm=np.hypot(real, imag),
                     able=able,
@@ -248,9 +286,14 @@ def _tees(case: Case, t: int, length_km: float) -> tuple[tuple[float, str], ...]
 def overview_view(result: dict[str, Any]) -> OverviewView:
     """What the overview picture shows."""
     bars: defaultdict[str, dict[str, Bar]] = defaultdict(dict)
+    names = tuple(dict.fromkeys(row["name"] for row in result["compared"]))
+    groups = len({row["setting_group"] for row in result["compared"]})
     for row in result["compared"]:
+        name = terminal_name(row)
+        if groups > 1:
+            name += f", {row['setting_group']}"
         found, reachable = row["detected"] is not None, row["opens"] - row["unreachable"]
-        bars[terminal_name(row)][row["name"]] = Bar(
+        bars[name][row["name"]] = Bar(
             share=row["detected"] / reachable if found and reachable else None,
             reason=row["reason"],
             low=row["dependability_low"] if found else 0.0,
@@ -259,7 +302,7 @@ def overview_view(result: dict[str, Any]) -> OverviewView:
             trials=row["trials"],
         )
     return OverviewView(
-        names=COMPARED,
+        names=names,
         terminals=tuple(bars),
-        bars=tuple(tuple(own[name] for name in COMPARED) for own in bars.values()),
+        bars=tuple(tuple(own[name] for name in names) for own in bars.values()),
     )

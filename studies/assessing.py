@@ -1,0 +1,313 @@
+"""``openphase assess``: what existing settings are worth, on the draws that ``size`` uses.
+
+Nothing is chosen and nothing is trained, so no attempt is spent. The validation sample is that
+of the same feeder, study, seed and size, so that `compare` can pair the two runs scenario by
+scenario.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..detector.criteria import Settings
+from ..model.errors import Fault, InputError
+from ..model.parts import Feeder
+from .run.cases import Case, make_cases
+from .run.certify import (
+    Given,
+    Rival,
+    Sheet,
+    Validation,
+    alpha_of,
+    compared_rows,
+    not_covered,
+    numerics,
+    section_row,
+)
+from .run.choose import reference_settings
+from .run.classes import Purpose
+from .run.digests import digest, manifest, population_digest
+from .run.engine import options_of
+from .run.ledger import Attempt, find_attempt
+from .run.options import options_text
+from .run.session import (
+    Demand,
+    Watch,
+    announce,
+    default_scenarios,
+    exit_code,
+    read_feeder,
+    read_own_study,
+    validate,
+)
+from .run.spec import Study, dump_study
+from .run.status import loop_note
+from .run.store import RunFolder, as_json
+from .settings_file import SettingsSheet, read_sheet
+from .show.report import write_report
+from .show.sheet import settings_csv, sheet_table
+
+__all__ = ["REFERENCE", "Assessment", "assess_command", "assess_feeder"]
+
+REFERENCE = "reference"  #: in place of a sheet: the study's reference at every terminal
+
+SAME_EVIDENCE = (
+    "the sheet is that of the run beside it, which was judged on these very draws: this is the "
+    "same evidence once more, and not further evidence"
+)
+CHOSEN_ON_THESE = (
+    "the sheet was changed after the run beside it had been judged on these very draws: where that "
+    "run's results guided the change, the settings were chosen on this sample and its bounds do "
+    "not hold; another --seed draws a fresh one"
+)
+
+LEFT_OUT = "the sheet leaves this terminal without a setting"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Assessment:
+    """A finished assessment, per group: the result as it is printed, and what the report draws."""
+
+    result: dict[str, Any]
+    cases: tuple[Case, ...]
+    validations: tuple[Validation, ...]
+
+
+def assess_command(args: argparse.Namespace) -> int:
+    """Run the verb; returns the exit code."""
+    feeder = read_feeder(args.feeder)
+    study, sheet = _read_both(args, feeder)
+    name = REFERENCE if sheet is None else Path(sheet.source).stem
+    out = args.out or Path("runs") / f"{feeder.name}-{name}"
+    if sheet is not None and out.resolve() == Path(sheet.source).resolve().parent:
+        where, wanted = "--out", "must not be the folder that the sheet is in"
+        raise InputError.single("", where, str(out), wanted)
+    assessment = assess_feeder(feeder, study, sheet, Demand.of(args), out)
+    if args.json:
+        print(as_json(assessment.result), end="")
+    else:
+        print(sheet_table(assessment.result))
+        print(f"\nResults: {out} (report.html, settings.csv, result.json)")
+    return exit_code(assessment.result)
+
+
+def _read_both(args: argparse.Namespace, feeder: Feeder) -> tuple[Study, SettingsSheet | None]:
+    """Study and sheet; the faults of both at once."""
+    faults: list[Fault] = []
+    study: Study | None = None
+    sheet: SettingsSheet | None = None
+    try:
+        study = read_own_study(args, feeder)
+    except InputError as error:
+        faults += error.faults
+    if args.settings != REFERENCE:
+        options = options_of(study or Study())
+        try:
+            sheet = read_sheet(Path(args.settings), feeder, options)
+        except InputError as error:
+            faults += error.faults
+    if faults or study is None:
+        raise InputError(faults)
+    return study, sheet
+
+
+def assess_feeder(
+    feeder: Feeder, study: Study, sheet: SettingsSheet | None, demand: Demand, out: Path
+) -> Assessment:
+    """Judge a sheet, None for the study's reference everywhere, and write the run folder ``out``.
+
+    Raises
+    ------
+    InputError
+        If feeder, study and sheet do not go together.
+    OpenPhaseError
+        If the folder cannot be used, or the run is long and ``demand.yes`` is not set.
+    """
+    cases = make_cases(feeder, study)
+    given = _settings(cases, sheet)
+    folder, attempt = _begin(cases, given, demand, out)
+    watch = Watch()
+    beside = sheet is not None
+    rivals = [[_rivals(study, own, beside) for own in group] for group in given]
+    validations = tuple(
+        validate(
+            case,
+            tuple(tuple(rival.settings for rival in own) for own in group),
+            attempt,
+            folder,
+            demand.jobs,
+        )
+        for case, group in zip(cases, rivals, strict=True)
+    )
+    watch.lap("validate_s")
+    sheets = [
+        Sheet(
+            case=case,
+            validation=own,
+            alpha=alpha_of(cases, attempt.number),
+            attempt=attempt.number,
+            chosen=False,
+        )
+        for case, own in zip(cases, validations, strict=True)
+    ]
+    answer = {
+        "version": __version__,
+        "seed": demand.seed,
+        "feeder": feeder.name,
+        "study_hash": digest(dump_study(study)),
+        "confidence": study.certificate.confidence,
+        "attempt": attempt.number,
+        "scenarios": attempt.scenarios,
+        "assessed": _assessed(sheet, given, attempt),
+        "sections": [
+            section_row(own, t, _given(own.case, t, settings))
+            for own, group in zip(sheets, given, strict=True)
+            for t, settings in enumerate(group)
+        ],
+        "compared": [
+            row
+            for own, group in zip(sheets, rivals, strict=True)
+            for t, rival in enumerate(group)
+            if own.case.judged[t] or rival[0].settings
+            for row in compared_rows(own, t, rival)
+        ],
+        "feeder_false_trips": {"per_year_upper": None, "assumptions": not_covered(validations)},
+        "numerics": numerics(validations),
+    }
+    folder.write("result.json", as_json(answer))
+    folder.write("settings.csv", settings_csv(answer))
+    write_report(answer, cases, None, validations, folder)
+    watch.lap("report_s")
+    folder.write("timing.json", as_json(watch.laps))
+    return Assessment(result=answer, cases=cases, validations=validations)
+
+
+def _settings(
+    cases: Sequence[Case], sheet: SettingsSheet | None
+) -> tuple[tuple[Settings | None, ...], ...]:
+    """Per group and terminal what the sheet says, or the study's reference everywhere."""
+    if sheet is None:
+        reference = reference_settings(cases[0].study)
+        return tuple(tuple(reference for _ in case.points.terminals) for case in cases)
+    groups = sheet.for_groups([case.group.name for case in cases])
+    return tuple(
+        tuple(own.get((terminal.local, terminal.remote)) for terminal in case.points.terminals)
+        for case, own in zip(cases, groups, strict=True)
+    )
+
+
+def _begin(
+    cases: Sequence[Case],
+    given: tuple[tuple[Settings | None, ...], ...],
+    demand: Demand,
+    out: Path,
+) -> tuple[RunFolder, Attempt]:
+    """Announce the run and make the folder its own; the ledger is read, not written."""
+    feeder, study = cases[0].feeder, cases[0].study
+    attempt = find_attempt(
+        out.resolve().parent / "ledger.json",
+        population_digest(feeder, study),
+        digest(dump_study(study)),
+        demand.seed,
+        demand.scenarios or functools.partial(default_scenarios, cases),
+    )
+    folder = RunFolder(out)
+    command = ("assess", feeder.name, "--settings", "settings.csv", "--study", "study.toml")
+    made_from = manifest(command, feeder, study, attempt)
+    made_from["settings_sha256"] = _digest_of(given)
+    announce(cases, folder, made_from, attempt, demand, (Purpose.VALIDATE,))
+    folder.begin(made_from)
+    folder.write("study.toml", dump_study(study))
+    folder.log(
+        f"assess {feeder.name}, seed {attempt.seed}, attempt {attempt.number}, "
+        f"n {attempt.scenarios}"
+    )
+    return folder, attempt
+
+
+def _rivals(study: Study, own: Settings | None, beside: bool) -> tuple[Rival, ...]:
+    """The sheet's setting, and the reference ``beside`` it unless that is what is assessed."""
+    assessed = Rival(name="assessed", settings=own, missing=LEFT_OUT)
+    reference = Rival(name="reference", settings=reference_settings(study))
+    return (assessed, reference) if beside else (assessed,)
+
+
+def _given(case: Case, t: int, own: Settings | None) -> Given:
+    if own is None:
+        return Given(settings=None, missing=LEFT_OUT)
+    return Given(settings=own, note=loop_note(case, t, own.z_set_ohm))
+
+
+def _digest_of(given: tuple[tuple[Settings | None, ...], ...]) -> str:
+    return digest(*(repr(own) for group in given for own in group))
+
+
+# ---- where the sheet comes from ----
+
+
+def _assessed(
+    sheet: SettingsSheet | None,
+    given: tuple[tuple[Settings | None, ...], ...],
+    attempt: Attempt,
+) -> dict[str, Any]:
+    """What was assessed, and whether these very draws had a part in choosing it."""
+    origin = None if sheet is None else _origin(Path(sheet.source).parent, sheet, attempt)
+    note = None
+    if origin is not None and origin["same_draws"]:
+        note = CHOSEN_ON_THESE if origin["edited"] else SAME_EVIDENCE
+    return {
+        "settings": REFERENCE if sheet is None else Path(sheet.source).name,
+        "settings_sha256": _digest_of(given),
+        "run_beside": origin,
+        "note": note,
+    }
+
+
+def _origin(folder: Path, sheet: SettingsSheet, attempt: Attempt) -> dict[str, Any] | None:
+    """The run in whose folder the sheet lies; None where there is none."""
+    try:
+        made_from = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        drawn = tuple(made_from[key] for key in ("population_sha256", "seed", "attempt"))
+        return {
+            "verb": str(made_from["command"][0]),
+            "seed": made_from["seed"],
+            "attempt": made_from["attempt"],
+            "same_draws": drawn == (attempt.population, attempt.seed, attempt.number),
+            "edited": _sheet_values(sheet) != _result_values(result),
+        }
+    except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError):
+        return None  # no run of this package
+
+
+Values = dict[tuple[str, str, str], tuple[object, ...] | None]
+
+
+def _sheet_values(sheet: SettingsSheet) -> Values:
+    return {
+        (group, *pair): None
+        if own is None
+        else (
+            *(own.i_set_a, own.v_set_pu, own.z_set_ohm),
+            *(own.options.negative_sign, options_text(own.options)),
+        )
+        for group, rows in sheet.groups.items()
+        for pair, own in rows.items()
+    }
+
+
+def _result_values(result: dict[str, Any]) -> Values:
+    keys = ("i_set_a", "v_set_pu", "z_set_ohm", "negative_sign", "options")
+    return {
+        (row["setting_group"], row["local"], row["remote"]): None
+        if row["i_set_a"] is None
+        else tuple(row[key] for key in keys)
+        for row in result["sections"]
+    }

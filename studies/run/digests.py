@@ -1,0 +1,59 @@
+"""What a run was made from, as hashes: resuming and comparing need the same."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from dataclasses import replace
+from importlib import metadata, resources
+
+from ... import __version__
+from ...model.feeder_file import dump_feeder
+from ...model.parts import Feeder
+from .engine import BLOCK
+from .ledger import Attempt
+from .spec import Study, dump_population, dump_study, resolved
+
+__all__ = ["code_digest", "digest", "manifest", "population_digest"]
+
+LIBRARIES = ("numpy", "scipy", "numba")
+
+
+def digest(*texts: str) -> str:
+    """SHA-256 of texts."""
+    return hashlib.sha256("\0".join(texts).encode("utf-8")).hexdigest()
+
+
+def population_digest(feeder: Feeder, study: Study) -> str:
+    """SHA-256 of what decides which scenarios there are, however it is written or called."""
+    own = resolved(study, feeder)
+    return digest(dump_feeder(replace(feeder, name="any")), dump_population(own))
+
+
+def code_digest() -> str:
+    """SHA-256 of the package's sources: blocks of one code are never mixed with another's."""
+    root = resources.files(__package__.partition(".")[0])
+    with resources.as_file(root) as folder:
+        rooms = ("model", "detector", "optimise", "studies")
+        files = sorted(path for room in rooms for path in (folder / room).rglob("*.py"))
+        return digest(*(path.read_text(encoding="utf-8") for path in files))
+
+
+def manifest(
+    command: tuple[str, ...], feeder: Feeder, study: Study, attempt: Attempt
+) -> dict[str, object]:
+    """What a run was made from; ``command`` is the verb with its inputs."""
+    return {
+        "command": [*command, "--seed", attempt.seed, "--scenarios", attempt.scenarios],
+        "openphase": __version__,
+        "code_sha256": code_digest(),
+        "python": platform.python_version(),
+        "libraries": {name: metadata.version(name) for name in LIBRARIES},
+        "feeder_sha256": digest(dump_feeder(feeder)),
+        "study_sha256": digest(dump_study(study)),
+        "population_sha256": attempt.population,
+        "seed": attempt.seed,
+        "scenarios": attempt.scenarios,
+        "attempt": attempt.number,
+        "block": BLOCK,
+    }
