@@ -23,6 +23,9 @@ VERBS = {
     "study": {
         "size": "the best settings of every section, with their certificate",
     },
+    "proof": {
+        "paper": "the paper's results beside what the model makes of its feeder, and why",
+    },
 }
 """Group, verb, and what the verb does in a line: ``--help`` is printed from here."""
 
@@ -115,7 +118,12 @@ def build_parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(
         dest="verb", metavar="VERB", required=True, prog="openphase", help=argparse.SUPPRESS
     )
-    arguments = {"check": _check_arguments, "solve": _solve_arguments, "size": _size_arguments}
+    arguments = {
+        "check": _check_arguments,
+        "solve": _solve_arguments,
+        "size": _size_arguments,
+        "paper": _paper_arguments,
+    }
     for group in VERBS.values():
         for verb, summary in group.items():
             verb_parser = verbs.add_parser(verb, description=summary, allow_abbrev=False)
@@ -196,6 +204,14 @@ def _size_arguments(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(handler=_size, resumes=True)
 
 
+def _paper_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="also leave the answer and the pictures in DIR"
+    )
+    _add_json(parser)
+    parser.set_defaults(handler=_paper)
+
+
 def _add_feeder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("feeder", metavar="FEEDER", help="a feeder file, or a shipped name: paper")
 
@@ -231,3 +247,9 @@ def _size(args: argparse.Namespace) -> int:
     from .sizing import size_command
 
     return size_command(args)
+
+
+def _paper(args: argparse.Namespace) -> int:
+    from .paper import paper_command
+
+    return paper_command(args)

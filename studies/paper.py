@@ -53,11 +53,12 @@ def paper_groups(feeder: Feeder) -> tuple[Group, ...]:
 
 def _write(folder: Path, feeder: Feeder, groups: tuple[Group, ...]) -> None:
     """The answer, the table and the pictures."""
-    from .show.paper_figures import paper_pictures  # noqa: PLC0415  (only pictures need it)
+    from .paper_courses import paper_panels  # noqa: PLC0415  (only pictures need it)
+    from .show.paper_figures import paper_pictures  # noqa: PLC0415
 
     write_whole(folder / "result.json", as_json(paper_result(groups)).encode())
     write_whole(folder / "paper.txt", paper_table(groups).encode())
-    for name, content in paper_pictures(feeder):
+    for name, content in paper_pictures(paper_panels(feeder)):
         write_whole(folder / name, content)
     print(f"pictures and tables are in {folder}", file=sys.stderr)
 
@@ -87,8 +88,9 @@ def paper_result(groups: Iterable[Group]) -> dict[str, Any]:
 
 
 def _row_result(row: Row) -> dict[str, Any]:
-    is_text = isinstance(row.model, str)
     gap = _difference(row)
+    size = None if isinstance(row.model, str) else abs(row.model)
+    turned = isinstance(row.model, complex)
     return {
         "name": row.name,
         "quantity": row.quantity,
@@ -96,11 +98,9 @@ def _row_result(row: Row) -> dict[str, Any]:
         "paper": None if row.paper is None else row.paper.value,
         "paper_about": None if row.paper is None else row.paper.about,
         "paper_where": None if row.paper is None else row.paper.where,
-        "model": row.model if isinstance(row.model, str) else abs(row.model),
-        "model_deg": math.degrees(cmath.phase(row.model))
-        if isinstance(row.model, complex)
-        else None,
-        "model_text": row.model if is_text else _model(row),
+        "model": size,
+        "model_deg": math.degrees(cmath.phase(complex(row.model))) if turned else None,
+        "model_text": _model(row),
         "difference": None if gap is None else gap[0],
         "difference_pct": None if gap is None else gap[1],
         "basis": row.basis,
@@ -123,8 +123,8 @@ def paper_table(groups: Iterable[Group]) -> str:
     """The comparison in 100 columns, reasons below their rows."""
     lines = [
         *wrapped(
-            "The results of the paper's Section V beside those of the shipped feeder `paper`, an "
-            "exact steady-state model; transients are not modelled."
+            "The paper's results (its Section V) beside what the model makes of the shipped feeder "
+            "`paper`: exact steady states before and after; transients are not modelled."
         ),
         "",
         _columns(("", "paper", "model", "difference", "basis")),
@@ -180,4 +180,6 @@ def _gap_text(row: Row) -> str:
         return ""
     digits = 1 if row.paper.value >= 10.0 else 3
     digits = min(row.digits, digits)
-    return f"{gap[0]:+.{digits}f} ({gap[1]:+.1f} %)"
+    # rounded first, and zero added, so that no "-0.0" is printed
+    size, share = round(gap[0], digits) + 0.0, round(gap[1], 1) + 0.0
+    return f"{size:+.{digits}f} ({share:+.1f} %)"

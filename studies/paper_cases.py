@@ -11,28 +11,33 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from ..detector.criteria import Reason, Settings, verdict
 from ..detector.evidence import Phasors, evidence_of
 from ..detector.impedance import connection_impedance
 from ..detector.superimpose import superimposed
 from ..model.errors import OpenPhaseError
+from ..model.machines import carried_over
 from ..model.network import compile_network, locate
-from ..model.parts import Feeder, Line
+from ..model.parts import Der, DerModel, Feeder, Line
 from ..model.points import Points, Terminal, find_points, into_line, point_probes
 from ..model.solve import solve, steady_state
-from ..model.states import NOT_CONVERGED, Answer
+from ..model.states import NOT_CONVERGED
 from ..model.symmetrical import to_sequences
 
 __all__ = [
     "BREAK_AT",
     "BROKEN_LINE",
+    "PV_KW",
     "Case",
     "Part",
     "ideal_banks",
     "line_ohm",
     "open_phase_a",
+    "pv_impedance",
     "unit_at",
+    "with_pv",
     "yg_d",
     "z0_factor",
 ]
@@ -45,6 +50,8 @@ Part = Literal["0", "1", "2", "a", "b", "c"]
 
 BROKEN_LINE, BREAK_AT = "R2-R3", 0.6
 PHASE_A = 0b001
+PV_KW = 700.0
+PV_RANGE_OHM = (1.0, 100.0)  #: sought in; from a twentieth to half of the PV's rated impedance
 
 
 # ---- variants of the feeder ----
@@ -168,22 +175,50 @@ def open_phase_a(
     closed = frozenset(switch.name for switch in feeder.switches) if tie_closed else None
     network = compile_network(feeder, closed)
     points = find_points(feeder, network)
+    probes = point_probes(points)
     edge, share = locate(network, line, at)
     before = steady_state(network)._replace(edge=np.array([edge]), share=np.array([share]))
+    whole = solve(network, before, probes)
     after = before._replace(open_mask=np.array([PHASE_A]))
-    answers = [solve(network, state, point_probes(points)) for state in (before, after)]
-    return _case(feeder, points, answers, network.tree.v_nominal_v)
-
-
-def _case(feeder: Feeder, points: Points, answers: list[Answer], v_nominal_v: float) -> Case:
-    if any(answer.flags[0] & NOT_CONVERGED for answer in answers):
-        raise OpenPhaseError(f"{feeder.name}: voltage-dependent loads did not settle")
+    after = carried_over(network, before, whole, after, np.ones((len(feeder.ders), 1)))
+    broken = solve(network, after, probes, start=whole.unit_v_pu)
+    if (whole.flags[0] | broken.flags[0]) & NOT_CONVERGED:
+        raise OpenPhaseError(f"{feeder.name}: loads or generation did not settle")
     into = into_line(points)[:, None, None]
     return Case(
         points=points,
         phasors=Phasors(
-            v=np.stack([answer.v for answer in answers]),
-            i=np.stack([answer.i * into for answer in answers]),
+            v=np.stack([whole.v, broken.v]), i=np.stack([whole.i * into, broken.i * into])
         ),
-        v_nominal_v=v_nominal_v,
+        v_nominal_v=network.tree.v_nominal_v,
     )
+
+
+# ---- the PV system, of which the paper says no more than kW and place ----
+
+
+def with_pv(feeder: Feeder, model: DerModel, z1_ohm: complex | None = None) -> Feeder:
+    """The feeder with the paper's PV system behind T6; no path for the other sequences."""
+    pv = Der(
+        name="PV",
+        transformer="T6",
+        place=None,
+        kw=PV_KW,
+        power_factor=1.0,
+        model=model,
+        z1_ohm=z1_ohm,
+        z2_ohm=None,
+        z0_ohm=None,
+    )
+    return replace(feeder, ders=(pv,))
+
+
+def pv_impedance(feeder: Feeder, degrees: float, wanted_ohm: float) -> complex:
+    """Z_pv of this angle, behind which a constant EMF shows ``wanted_ohm`` as |Z1| at R2."""
+    turn = np.exp(1j * np.radians(degrees))
+
+    def gap(size_ohm: float) -> float:
+        case = open_phase_a(with_pv(feeder, "thevenin", size_ohm * turn))
+        return abs(case.z_ohm("R2", "R3")) - wanted_ohm
+
+    return complex(turn * brentq(gap, *PV_RANGE_OHM))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ..model.closed_form import z_op1_loop_approx
-from ..model.parts import Feeder
-from .paper_cases import PV_KW, line_ohm, open_phase_a, pv_impedance, trips, with_pv
+from ..model.parts import DerModel, Feeder
+from .paper_cases import PV_KW, line_ohm, open_phase_a, pv_impedance, with_pv
 from .paper_printed import PRINTED, SETTINGS, Group, Row
 
 __all__ = ["OTHER_R3_R4_OHM", "two_source_groups"]
@@ -24,7 +26,8 @@ def two_source_groups(feeder: Feeder) -> Iterator[Group]:
 def _figure_14(feeder: Feeder) -> Group:
     case = open_phase_a(feeder, tie_closed=True)
     ohm = {line.name: line.z1_ohm_per_km * line.length_km for line in feeder.lines}
-    rest = z_op1_loop_approx(sum(ohm.values()), ohm["R2-R3"])
+    total = np.array(sum(ohm.values(), start=0j))
+    rest = float(np.abs(z_op1_loop_approx(total, np.array(ohm["R2-R3"]))))
     parts = " + ".join(f"{abs(z):g}" for name, z in ohm.items() if name != "R2-R3")
     rows = [
         Row(
@@ -36,7 +39,7 @@ def _figure_14(feeder: Feeder) -> Group:
             basis="circuit",
             paper=PRINTED["loop_ohm"],
             why="Minus what joins R2 and R3 outside the section, up to the loop's loads: "
-            f"{parts} = {abs(rest):.2f} Ω of line. The printed impedances cannot give 2.21 Ω; "
+            f"{parts} = {rest:.2f} Ω of line. The printed impedances cannot give 2.21 Ω; "
             "they also contradict the paper's own 0.13 Ω/km on two of four lines."
             if local == "R2"
             else "",
@@ -47,7 +50,7 @@ def _figure_14(feeder: Feeder) -> Group:
     rows += [
         Row(
             name=f"loop_{local.lower()}_052_ohm",
-            quantity=f"the same, (R3, R4) of {OTHER_R3_R4_OHM:g} Ω",
+            quantity=f"|Z1| at {local}, (R3, R4) of {OTHER_R3_R4_OHM:g} Ω",
             unit="Ω",
             model=other.z_ohm(local, remote),
             digits=4,
@@ -79,84 +82,99 @@ def _figure_14(feeder: Feeder) -> Group:
 
 
 def _figure_15(feeder: Feeder) -> Group:
-    wanted = PRINTED["pv_ohm"].value
-    inductive, resistive = (pv_impedance(feeder, degrees, wanted) for degrees in (90.0, 0.0))
-    rated = (feeder.source.kv_ll * 1000.0) ** 2 / (PV_KW * 1000.0)
-    share = [100.0 * abs(z) / rated for z in (inductive, resistive)]
-    current = open_phase_a(with_pv(feeder, "constant_current"))
-    power = open_phase_a(with_pv(feeder, "constant_power"))
+    stiff = [pv_impedance(feeder, degrees, PRINTED["pv_ohm"].value) for degrees in (90.0, 0.0)]
     return Group(
         name="Fig. 15",
         title=f"a PV system of {PV_KW:g} kW behind T6, phase A open",
-        rows=(
-            Row(
-                name="z_pv_90_ohm",
-                quantity=f"|Z_pv| for {wanted:g} Ω, at 90°",
-                unit="Ω",
-                model=abs(inductive),
-                digits=2,
-                basis="fit",
-                why="Solved for. A steady EMF behind Z_pv makes Z1 minus the whole loop of eq. (17): "
-                "source, lines, and the load in parallel with T6 and Z_pv, whatever the PV's other "
-                "sequences are.",
-            ),
-            Row(
-                name="z_pv_0_ohm",
-                quantity=f"|Z_pv| for {wanted:g} Ω, at 0°",
-                unit="Ω",
-                model=abs(resistive),
-                digits=2,
-                basis="fit",
-                why=f"So the figure needs an EMF behind {share[0]:.0f} to {share[1]:.0f} % of the "
-                f"PV's rated {rated:.0f} Ω: a stiff voltage source, not the controlled current "
-                "source that the paper's Section III-E describes.",
-            ),
-            Row(
-                name="pv_constant_current_ohm",
-                quantity="|Z1| at R2, PV as constant current",
-                unit="Ω",
-                model=current.z_ohm("R2", "R3"),
-                digits=1,
-                basis="circuit",
-                paper=PRINTED["pv_ohm"],
-                why="A current that stays adds nothing to the changes: the load's 288 Ω again, while "
-                "the current through the break, and ΔI1 with it, is much smaller.",
-            ),
-            Row(
-                name="pv_constant_current_di1_a",
-                quantity="|ΔI1| there",
-                unit="A",
-                model=current.di_a("R2", "1"),
-                digits=2,
-                basis="fit",
-            ),
-            Row(
-                name="pv_constant_power_ohm",
-                quantity="|Z1| at R2, PV as constant power",
-                unit="Ω",
-                model=power.z_ohm("R2", "R3"),
-                digits=0,
-                basis="fit",
-                paper=PRINTED["pv_ohm"],
-                why="To small changes a constant power is a negative resistance; more of it than "
-                "load beyond the break turns the sign of Z1.",
-            ),
-            Row(
-                name="pv_constant_power_di1_a",
-                quantity="|ΔI1| there",
-                unit="A",
-                model=power.di_a("R2", "1"),
-                digits=2,
-                basis="fit",
-            ),
-            Row(
-                name="verdict_pv",
-                quantity="R2 with the paper's 1 A, 5 %, 5 Ω",
-                unit="",
-                model="; ".join(case.said("R2", "R3", SETTINGS) for case in (current, power)),
-                digits=0,
-                basis="fit",
-                why="Constant current first, then constant power.",
-            ),
+        rows=(*_emf_rows(feeder, stiff), *_other_rows(feeder)),
+    )
+
+
+def _emf_rows(feeder: Feeder, stiff: list[complex]) -> Iterator[Row]:
+    """The PV as an EMF behind the impedances that make the paper's figure."""
+    printed = PRINTED["pv_ohm"]
+    rated = (feeder.source.kv_ll * 1000.0) ** 2 / (PV_KW * 1000.0)
+    share = [100.0 * abs(z) / rated for z in stiff]
+    reasons = (
+        "Solved for. With an EMF that stays, Z1 is minus the loop of eq. (17): source, lines, and "
+        "the load in parallel with T6 and Z_pv; Z2 and Z0 of the PV do not matter.",
+        f"So the figure needs an EMF behind {share[0]:.0f} to {share[1]:.0f} % of the PV's rated "
+        f"{rated:.0f} Ω: a stiff voltage source, not the controlled current source that the "
+        "paper's Section III-E describes.",
+    )
+    for z_pv, degrees, why in zip(stiff, (90, 0), reasons, strict=True):
+        case = open_phase_a(with_pv(feeder, "thevenin", z_pv))
+        yield Row(
+            name=f"z_pv_{degrees}_ohm",
+            quantity=f"|Z_pv| for {printed.value:g} Ω, at {degrees}°",
+            unit="Ω",
+            model=abs(z_pv),
+            digits=2,
+            basis="fit",
+            why=why,
+        )
+        yield Row(
+            name=f"pv_emf_{degrees}_ohm",
+            quantity="|Z1| at R2 with it",
+            unit="Ω",
+            model=case.z_ohm("R2", "R3"),
+            digits=1,
+            basis="fit",
+            paper=printed,
+        )
+        yield Row(
+            name=f"verdict_pv_emf_{degrees}",
+            quantity="R2 with the paper's 1 A, 5 %, 5 Ω",
+            unit="",
+            model=case.said("R2", "R3", SETTINGS),
+            digits=0,
+            basis="fit",
+        )
+
+
+def _other_rows(feeder: Feeder) -> Iterator[Row]:
+    """The PV as what inverters are usually taken for."""
+    models: tuple[tuple[DerModel, str, int, str], ...] = (
+        (
+            "constant_current",
+            "constant current",
+            1,
+            "A current that stays adds nothing to the changes: the load's 288 Ω again, while the "
+            "current through the break, and ΔI1 with it, is much smaller.",
+        ),
+        (
+            "constant_power",
+            "constant power",
+            0,
+            "To small changes a constant power is a negative resistance; more of it than load "
+            "beyond the break turns the sign of Z1.",
         ),
     )
+    for model, words, digits, why in models:
+        case = open_phase_a(with_pv(feeder, model))
+        yield Row(
+            name=f"pv_{model}_ohm",
+            quantity=f"|Z1| at R2, PV as {words}",
+            unit="Ω",
+            model=case.z_ohm("R2", "R3"),
+            digits=digits,
+            basis="variant",
+            paper=PRINTED["pv_ohm"],
+            why=why,
+        )
+        yield Row(
+            name=f"pv_{model}_di1_a",
+            quantity="|ΔI1| there",
+            unit="A",
+            model=case.di_a("R2", "1"),
+            digits=2,
+            basis="fit",
+        )
+        yield Row(
+            name=f"verdict_pv_{model}",
+            quantity="R2 with the paper's 1 A, 5 %, 5 Ω",
+            unit="",
+            model=case.said("R2", "R3", SETTINGS),
+            digits=0,
+            basis="fit",
+        )

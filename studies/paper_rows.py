@@ -46,10 +46,10 @@ def _figure_10(case: Case, ideal: Case) -> Group:
                 digits=3,
                 basis="fit",
                 paper=PRINTED["dv_a_r3_pct"],
-                why="T4's Yg/Δ winding restores phase A through its leakage; how well depends on the "
-                "other zero-sequence paths beyond the break, and so on cores the paper does not "
-                f"describe. Without a core's path (ideal banks) it is {ideal.dv_pct('R3', 'a'):.1f} "
-                f"%. It is a change of phasor: the magnitude falls by {fall:.2f} % only.",
+                why="T4's Yg/Δ winding restores phase A through its leakage; how well depends on "
+                "the other zero-sequence paths beyond the break, and so on cores the paper does "
+                f"not describe: ideal banks make it {ideal.dv_pct('R3', 'a'):.1f} %. It is a "
+                f"change of phasor; the magnitude falls by {fall:.2f} % only.",
             ),
             Row(
                 name="dv1_r3_pct",
@@ -58,9 +58,9 @@ def _figure_10(case: Case, ideal: Case) -> Group:
                 model=dv1,
                 digits=3,
                 basis="fit",
-                why="The paper holds phase A's 10 % against V_set = 5 %. Criterion (23), as written, "
-                f"looks at the positive sequence, and {dv1:.1f} % does not exclude R3: only |ΔI1|, "
-                f"{case.di_a('R3', '1'):.2f} A there, keeps it quiet.",
+                why="The paper holds phase A's 10 % against V_set = 5 %. Criterion (23), as "
+                f"written, looks at the positive sequence, and {dv1:.1f} % does not exclude R3: "
+                f"only |ΔI1|, {case.di_a('R3', '1'):.2f} A there, keeps it quiet.",
             ),
             Row(
                 name="di_a_r3_a",
@@ -156,12 +156,12 @@ def _figure_12(case: Case, z_s_ohm: complex) -> Group:
 
 
 def _figure_13(feeder: Feeder) -> Group:
-    z_s, z_t = feeder.source.z1_ohm, _leakage_ohm(feeder)
+    z_s, z_t = np.array(feeder.source.z1_ohm), np.array(_leakage_ohm(feeder))
     rows = []
     for n, more in enumerate(MORE_YG_D, start=1):
         plain = yg_d(feeder, *more)
         without = abs(open_phase_a(ideal_banks(plain)).z_ohm("R2", "R3", "a"))
-        formula = abs(z_op_a_yg_d_approx(z_s, z_t, n))
+        formula = float(np.abs(z_op_a_yg_d_approx(z_s, z_t, np.array(n, float))))
         rows += [
             Row(
                 name=f"z_a_{n}_ohm",
@@ -171,7 +171,7 @@ def _figure_13(feeder: Feeder) -> Group:
                 digits=3,
                 basis="fit",
                 paper=PRINTED[f"z_a_{n}_ohm"],
-                why=f"The lines to the unit{'s' * (n > 1)}, which eq. (13) leaves out, make its "
+                why=f"The lines to the unit{'s' * (n > 1)}, which eq. (13) leaves out, raise its "
                 f"{formula:.1f} Ω to {without:.2f} Ω; the cores of the other units (X0, fitted) "
                 "take the rest off again.",
             ),
@@ -202,7 +202,7 @@ def _sensitivity(feeder: Feeder, ideal: Case) -> Group:
     rows = [
         Row(
             name=f"t4_at_{at:g}",
-            quantity=f"|Z_A|, 1 Yg/Δ, T4 at {at:g} of (R2, R3)",
+            quantity=f"|Z_A|, 1 Yg/Δ, T4 at {at:g} of R2-R3",
             unit="Ω",
             model=open_phase_a(unit_at(feeder, "T4", at), at=between).z_ohm("R2", "R3", "a"),
             digits=2,
@@ -229,7 +229,7 @@ def _sensitivity(feeder: Feeder, ideal: Case) -> Group:
             quantity=f"|Z_A|, {n} Yg/Δ, lines with Z0 = 3 Z1",
             unit="Ω",
             model=open_phase_a(yg_d(overhead, *more)).z_ohm("R2", "R3", "a"),
-            digits=2,
+            digits=3,
             basis="variant",
             paper=PRINTED[f"z_a_{n}_ohm"],
             why="Usual for overhead lines; the paper gives no Z0. That T4 at 0.9, X0 = 1.0 pu and "
