@@ -96,8 +96,9 @@ def _emf_rows(feeder: Feeder, stiff: list[complex]) -> Iterator[Row]:
     rated = (feeder.source.kv_ll * 1000.0) ** 2 / (PV_KW * 1000.0)
     share = [100.0 * abs(z) / rated for z in stiff]
     reasons = (
-        "Solved for. With an EMF that stays, Z1 is minus the loop of eq. (17): source, lines, and "
-        "the load in parallel with T6 and Z_pv; Z2 and Z0 of the PV do not matter.",
+        "Solved for. Beside an EMF that stays the source's term of eq. (17) is real: Z1 is about "
+        "minus the impedance up to R2, and minus that beyond the break, the load in parallel with "
+        "T6 and Z_pv. Z2 and Z0 of the PV do not matter.",
         f"So the figure needs an EMF behind {share[0]:.0f} to {share[1]:.0f} % of the PV's rated "
         f"{rated:.0f} Ω: a stiff voltage source, not the controlled current source that the "
         "paper's Section III-E describes.",
