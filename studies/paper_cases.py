@@ -156,9 +156,10 @@ class Case:
 
     def said(self, local: str, remote: str, settings: Settings) -> str:
         """What one terminal says with these settings: ``trip``, or the criterion that fails."""
-        seen = evidence_of(self.phasors, (self.terminal(local, remote),), self.v_nominal_v)
+        ends = (self.terminal(local, remote),)
+        seen = evidence_of(self.phasors, ends, self.v_nominal_v, settings.options)
         reason = Reason(int(verdict(seen, settings)[0, 0]))
-        return "trip" if reason == Reason.TRIP else f"no: {reason.name.lower()}"
+        return "trip" if reason == Reason.TRIP else f"no: {reason.name.lower().replace('_', ' ')}"
 
 
 def _part(abc: Complex, part: Part) -> Complex:

@@ -9,7 +9,8 @@ import numpy as np
 from ..model.closed_form import z_op1_loop_approx
 from ..model.parts import DerModel, Feeder
 from .paper_cases import PV_KW, line_ohm, open_phase_a, pv_impedance, with_pv
-from .paper_printed import PRINTED, SETTINGS, Group, Row
+from .paper_printed import PRINTED, Group, Row
+from .paper_rows import verdict_rows
 
 __all__ = ["OTHER_R3_R4_OHM", "two_source_groups"]
 
@@ -63,16 +64,11 @@ def _figure_14(feeder: Feeder) -> Group:
         )
         for local, remote in BOTH_ENDS
     ]
-    rows.append(
-        Row(
-            name="verdict_loop",
-            quantity="R2 with the paper's 1 A, 5 %, 5 Ω",
-            unit="",
-            model=case.said("R2", "R3", SETTINGS),
-            digits=0,
-            basis="circuit",
-            why="As the paper says, a loop needs a lower Z_set than its default.",
-        )
+    rows += verdict_rows(
+        "verdict_loop",
+        case,
+        "circuit",
+        ("As the paper says, a loop needs a lower Z_set than its default.", ""),
     )
     return Group(
         name="Fig. 14",
@@ -123,14 +119,7 @@ def _emf_rows(feeder: Feeder, stiff: list[complex]) -> Iterator[Row]:
             basis="fit",
             paper=printed,
         )
-        yield Row(
-            name=f"verdict_pv_emf_{degrees}",
-            quantity="R2 with the paper's 1 A, 5 %, 5 Ω",
-            unit="",
-            model=case.said("R2", "R3", SETTINGS),
-            digits=0,
-            basis="fit",
-        )
+        yield from verdict_rows(f"verdict_pv_emf_{degrees}", case, "fit")
 
 
 def _other_rows(feeder: Feeder) -> Iterator[Row]:
@@ -171,11 +160,4 @@ def _other_rows(feeder: Feeder) -> Iterator[Row]:
             digits=2,
             basis="fit",
         )
-        yield Row(
-            name=f"verdict_pv_{model}",
-            quantity="R2 with the paper's 1 A, 5 %, 5 Ω",
-            unit="",
-            model=case.said("R2", "R3", SETTINGS),
-            digits=0,
-            basis="fit",
-        )
+        yield from verdict_rows(f"verdict_pv_{model}", case, "fit")

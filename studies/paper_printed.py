@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from ..detector.criteria import Settings
+from ..detector.criteria import Options, Settings
 
-__all__ = ["PRINTED", "SETTINGS", "Basis", "Group", "Printed", "Row"]
+__all__ = ["PRINTED", "SETTINGS", "WITH_PHASES", "Basis", "Group", "Printed", "Row"]
 
 Basis = Literal["circuit", "fit", "variant", "formula"]
 
-SETTINGS = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0)
-"""The paper's: 1 A and 5 % in its Section V-A, 5 Ω in Section IV."""
+SETTINGS = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0, options=Options(fallback=False))
+"""The paper's: 1 A and 5 % in its Section V-A, 5 Ω in Section IV; by Z1, as it simulates."""
+
+WITH_PHASES = replace(SETTINGS, options=Options(fallback=True))
+"""The same, where phase quantities stand in below 1 A of |ΔI1|, as its Section VI suggests."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

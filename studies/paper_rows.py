@@ -12,12 +12,34 @@ import numpy as np
 from ..model.closed_form import z_op_a_yg_d_approx
 from ..model.parts import Feeder
 from .paper_cases import Case, ideal_banks, open_phase_a, unit_at, yg_d, z0_factor
-from .paper_printed import PRINTED, SETTINGS, Group, Row
+from .paper_printed import PRINTED, SETTINGS, WITH_PHASES, Basis, Group, Row
 
-__all__ = ["open_loop_groups"]
+__all__ = ["MORE_YG_D", "open_loop_groups", "verdict_rows"]
 
-MORE_YG_D = ((), ("T5",), ("T5", "T6"))
+MORE_YG_D: tuple[tuple[str, ...], ...] = ((), ("T5",), ("T5", "T6"))
 """Which transformers become Yg/Δ beside T4, for one, two and three units."""
+
+
+def verdict_rows(
+    name: str, case: Case, basis: Basis, why: tuple[str, str] = ("", "")
+) -> tuple[Row, Row]:
+    """What R2 says with the paper's settings: by Z1 alone, and with its phases standing in."""
+    by_z1, with_phases = (
+        Row(
+            name=f"{name}{suffix}",
+            quantity=f"R2 at 1 A, 5 %, 5 Ω, {words}",
+            unit="",
+            model=case.said("R2", "R3", settings),
+            digits=0,
+            basis=basis,
+            why=reason,
+        )
+        for suffix, words, settings, reason in (
+            ("", "by Z1", SETTINGS, why[0]),
+            ("_phases", "phases standing in", WITH_PHASES, why[1]),
+        )
+    )
+    return by_z1, with_phases
 
 
 def open_loop_groups(feeder: Feeder) -> Iterator[Group]:
@@ -140,16 +162,17 @@ def _figure_12(case: Case, z_s_ohm: complex) -> Group:
                 f"where ΔV_m is not neglected; it would add {with_source - abs(z1):.2f} Ω.",
             ),
             *currents,
-            Row(
-                name="verdict_r2",
-                quantity="R2 with the paper's 1 A, 5 %, 5 Ω",
-                unit="",
-                model=case.said("R2", "R3", SETTINGS),
-                digits=0,
-                basis="fit",
-                why="ΔI1 = -I·Z20/(Z1+Z20) with Z20 = Z2∥Z0. T4 makes Z0 small, so that nearly all "
-                "of the change is zero sequence; what is left of ΔI1 stays below the paper's own "
-                "threshold, and its simulated case would not have been triggered by it.",
+            *verdict_rows(
+                "verdict_r2",
+                case,
+                "fit",
+                (
+                    "ΔI1 = -I·Z20/(Z1+Z20) with Z20 = Z2∥Z0. T4 makes Z0 small, so that nearly all "
+                    "of the change is zero sequence; what is left of ΔI1 stays below the paper's "
+                    "own threshold, and its simulated case would not have been triggered by it.",
+                    "What the paper's Section VI offers for such cases finds it: phase A's change "
+                    "is large, and its impedance, that of Fig. 13, negative and above 5 Ω.",
+                ),
             ),
         ),
     )

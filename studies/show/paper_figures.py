@@ -13,8 +13,17 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..paper_courses import Panel, Trace
-from .figures import axes_or_new, house_style, save_png
-from .plots import BLUE, GREEN, GREY, ORANGE, PURPLE, RED
+from .figures import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    RED,
+    axes_or_new,
+    house_style,
+    save_png,
+)
 
 __all__ = ["paper_pictures", "plot_panel"]
 

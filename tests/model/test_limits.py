@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracles.happenings import Seen, happen, scene_of, seen, three_phase_s
+from oracles.happenings import ANY_SEQUENCE, PAPER, Seen, happen, scene_of, seen, three_phase_s
 from oracles.scenes import Pair, change, connected, constants, looks
 from scipy.optimize import brentq
 
-from openphase.detector.criteria import Reason
+from openphase.detector.criteria import Reason, Settings
 from openphase.detector.impedance import connection_impedance
 from openphase.detector.instruments import disc_noise
 from openphase.model import Feeder, Place, load_feeder
@@ -144,6 +144,30 @@ def test_generation_at_constant_power_hides_the_load(kw: float, di1_a: float) ->
     found = broken(with_pv("constant_power", kw))
     assert found.di1_a == pytest.approx(di1_a, abs=0.005)
     assert found.reason == Reason.CURRENT
+
+
+def test_what_phases_find_where_the_positive_sequence_is_idle() -> None:
+    """Down to 50 kW beyond the break; nothing where load and generation cancel."""
+    feeder = load_feeder("paper")
+    for kw in (500.0, 250.0, 125.0, 50.0):
+        assert broken(beyond(feeder, kw)).with_phases == Reason.TRIP
+    for kw in (20.0, 0.0):
+        assert broken(beyond(feeder, kw)).with_phases == Reason.CURRENT
+    for kw, reason in ((250.0, Reason.TRIP), (500.0, Reason.CURRENT), (700.0, Reason.TRIP)):
+        assert broken(with_pv("constant_power", kw)).with_phases == reason
+
+
+def test_the_settings_and_the_floor_by_load_beyond_the_break() -> None:
+    """Share found, here 0 or 1: 1 A and 5 Ω none; 0.5 A and 50 Ω one; any sequence, all."""
+    stiff = replace(PAPER, i_set_a=0.5, z_set_ohm=50.0)
+    found = [broken(beyond(load_feeder("paper"), kw)) for kw in (500.0, 250.0, 125.0, 75.0)]
+
+    def trips(settings: Settings) -> list[bool]:
+        return [own.says(settings) == Reason.TRIP for own in found]
+
+    assert trips(PAPER) == [False, False, False, False]
+    assert trips(stiff) == [True, False, False, False]
+    assert trips(ANY_SEQUENCE) == [True, True, True, True]
 
 
 def test_generation_that_trips_in_the_same_window() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from oracles.scenes import Pair, Scene, change, scene
 
-from openphase.detector.criteria import Reason, Settings, verdict
-from openphase.detector.evidence import Phasors, evidence_of
+from openphase.detector.criteria import Options, Reason, Settings, verdict
+from openphase.detector.evidence import Evidence, Phasors, evidence_of
 from openphase.model.events.base import apply_event, no_event
 from openphase.model.machines import carried_over
 from openphase.model.network import locate
@@ -19,11 +19,23 @@ from openphase.model.points import into_line
 from openphase.model.solve import solve
 from openphase.model.states import NOT_CONVERGED, Answer, State
 
-__all__ = ["PAPER", "Seen", "happen", "scene_of", "seen", "three_phase_s"]
+__all__ = [
+    "ANY_SEQUENCE",
+    "FALLBACK",
+    "PAPER",
+    "Seen",
+    "happen",
+    "scene_of",
+    "seen",
+    "three_phase_s",
+]
 
 Complex = NDArray[np.complex128]
 
-PAPER = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0)
+#: by the positive sequence alone
+PAPER = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0, options=Options(fallback=False))
+FALLBACK = replace(PAPER, options=Options())
+ANY_SEQUENCE = replace(PAPER, options=Options(fallback=False, any_sequence=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,15 +43,34 @@ class Seen:
     """What one terminal sees of one event, without noise."""
 
     z_ohm: complex  #: eq. (5) in positive sequence
-    di1_a: float
-    dv1_pu: float
-    reason: Reason  #: with the paper's settings
+    evidence: Evidence
     pair: Pair
 
     @property
     def z(self) -> tuple[float, float]:
         """Magnitude, and angle in degrees."""
         return abs(self.z_ohm), float(np.degrees(np.angle(self.z_ohm)))
+
+    @property
+    def di1_a(self) -> float:
+        return float(self.evidence.di1_a[0, 0])
+
+    @property
+    def dv1_pu(self) -> float:
+        return float(self.evidence.dv1_pu[0, 0])
+
+    def says(self, settings: Settings) -> Reason:
+        return Reason(int(verdict(self.evidence, settings)[0, 0]))
+
+    @property
+    def reason(self) -> Reason:
+        """With the paper's settings, by the positive sequence."""
+        return self.says(PAPER)
+
+    @property
+    def with_phases(self) -> Reason:
+        """With the paper's settings, where phases stand in."""
+        return self.says(FALLBACK)
 
 
 def three_phase_s(at: Scene, kw: float) -> Complex:
@@ -79,12 +110,11 @@ def seen(at: Scene, frames: tuple[Answer, Answer], local: str = "R2", remote: st
         v=np.stack([frame.v[at.points.node] for frame in frames]),
         i=np.stack([frame.i[place] * into for frame in frames]),
     )
-    evidence = evidence_of(phasors, (terminal,), at.network.tree.v_nominal_v)
+    v_nominal_v = at.network.tree.v_nominal_v
+    asked = (PAPER.options, FALLBACK.options, ANY_SEQUENCE.options)
     return Seen(
         z_ohm=complex(pair.z()[0]),
-        di1_a=float(evidence.di1_a[0, 0]),
-        dv1_pu=float(evidence.dv1_pu[0, 0]),
-        reason=Reason(int(verdict(evidence, PAPER)[0, 0])),
+        evidence=evidence_of(phasors, (terminal,), v_nominal_v, *asked),
         pair=pair,
     )
 

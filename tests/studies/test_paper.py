@@ -95,11 +95,17 @@ def test_what_the_paper_s_settings_say(rows: dict[str, Row]) -> None:
     said = {name: row.model for name, row in rows.items() if name.startswith("verdict")}
     assert said == {
         "verdict_r2": "no: current",
+        "verdict_r2_phases": "trip",
         "verdict_loop": "no: impedance",
+        "verdict_loop_phases": "no: impedance",
         "verdict_pv_emf_90": "trip",
+        "verdict_pv_emf_90_phases": "trip",
         "verdict_pv_emf_0": "trip",
+        "verdict_pv_emf_0_phases": "trip",
         "verdict_pv_constant_current": "no: current",
+        "verdict_pv_constant_current_phases": "trip",
         "verdict_pv_constant_power": "no: current",
+        "verdict_pv_constant_power_phases": "trip",
     }
 
 
