@@ -25,6 +25,9 @@ VERBS = {
         "assess": "the same evidence for settings that exist already; nothing is chosen",
         "compare": "runs that share their draws, scenario by scenario: what was gained, and lost",
     },
+    "proof": {
+        "paper": "the paper's results beside what the model makes of its feeder, and why",
+    },
 }
 """Group, verb, and what the verb does in a line: ``--help`` is printed from here."""
 
@@ -123,6 +126,7 @@ def build_parser() -> argparse.ArgumentParser:
         "size": _size_arguments,
         "assess": _assess_arguments,
         "compare": _compare_arguments,
+        "paper": _paper_arguments,
     }
     for group in VERBS.values():
         for verb, summary in group.items():
@@ -232,6 +236,14 @@ def _add_run(parser: argparse.ArgumentParser, out: str) -> None:
     _add_json(parser)
 
 
+def _paper_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="also leave the answer and the pictures in DIR"
+    )
+    _add_json(parser)
+    parser.set_defaults(handler=_paper)
+
+
 def _add_feeder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("feeder", metavar="FEEDER", help="a feeder file, or a shipped name: paper")
 
@@ -279,3 +291,9 @@ def _compare(args: argparse.Namespace) -> int:
     from .comparing import compare_command
 
     return compare_command(args)
+
+
+def _paper(args: argparse.Namespace) -> int:
+    from .paper import paper_command
+
+    return paper_command(args)

@@ -11,6 +11,7 @@ import json
 import os
 import typing
 import zipfile
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -47,7 +48,8 @@ def write_whole(path: Path, content: bytes) -> None:
         part.write_bytes(content)
         part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # the folder itself may be what is wrong
+            part.unlink(missing_ok=True)
         raise OpenPhaseError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 

@@ -15,11 +15,31 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["DPI", "TALLEST", "axes_or_new", "house_style", "png_of", "save_figure", "save_png"]
+__all__ = [
+    "BLUE",
+    "DPI",
+    "GREEN",
+    "GREY",
+    "ORANGE",
+    "PURPLE",
+    "RED",
+    "SKY",
+    "TALLEST",
+    "YELLOW",
+    "axes_or_new",
+    "house_style",
+    "png_of",
+    "save_figure",
+    "save_png",
+]
 
 T = TypeVar("T")
 
 DPI = 120
+# Okabe and Ito's colours, which the colour-blind tell apart
+BLUE, ORANGE, GREEN, RED, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
+SKY, YELLOW, GREY = "#56B4E9", "#F0E442", "#777777"
+
 TALLEST = 100.0  #: inches that rows of a picture may take
 
 STYLE: Any = {

@@ -11,7 +11,22 @@ from numpy.typing import NDArray
 
 from ...model.parts import Feeder
 from .feeder_layout import FeederLayout, Mark, Tie, lay_out
-from .figures import TALLEST, axes_or_new, house_style, png_of, save_figure, save_png
+from .figures import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    RED,
+    SKY,
+    TALLEST,
+    YELLOW,
+    axes_or_new,
+    house_style,
+    png_of,
+    save_figure,
+    save_png,
+)
 from .sheet import setting_text
 from .views import Bar, Cloud, EvidenceView, Family, OverviewView, ProfileView, Setting
 
@@ -26,10 +41,6 @@ __all__ = [
 ]
 
 Real = NDArray[np.float64]
-
-# Okabe and Ito's colours, which the colour-blind tell apart
-BLUE, ORANGE, GREEN, RED, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
-SKY, YELLOW, GREY = "#56B4E9", "#F0E442", "#777777"
 
 FAMILIES: dict[Family, tuple[str, str]] = {
     Family.INSIDE: (BLUE, "o"),
