@@ -201,7 +201,7 @@ _KINDS = np.array([own.kind for own in REPORTED] + [""])
 
 def _of_kind(kind: str, rows: Int) -> Flags:
     """Events that count in rows of this kind."""
-    return np.asarray((kind == _KINDS)[rows])
+    return np.asarray(np.equal(_KINDS, kind)[rows])
 
 
 def _counted(rows: Int, among: Flags | None = None) -> Int:
