@@ -167,7 +167,7 @@ def _train(case: Case, attempt: Attempt, folder: RunFolder, jobs: int) -> Traini
 
 def _counts(cases: Sequence[Case], trainings: Sequence[Training]) -> bytes:
     """What training knows of every representable setting, per row of the sheet."""
-    arrays = pack(device_grid(cases[0]), "grid")
+    arrays = pack(cases[0].grid, "grid")
     for n, (case, training) in enumerate(zip(cases, trainings, strict=True)):
         for t in case.judged.nonzero()[0]:
             row = n * len(case.judged) + int(t)
