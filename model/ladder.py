@@ -60,6 +60,8 @@ __all__ = ["solve_block"]
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
+PATIENCE = 60  #: passes of a fixed point before it takes half steps
+
 
 @compiled
 def up(y: Matrix, z: Matrix) -> tuple[Matrix, Matrix]:
@@ -545,18 +547,23 @@ def add_charging_currents(tree: Tree, work: Work, edge: int, share: float) -> No
 
 
 @compiled
-def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, first: bool) -> float:
-    """Move winding and step voltages towards the solved ones; returns the largest gap, pu.
+def update_magnitudes(
+    tree: Tree, work: Work, unit_v_pu: Real, history: Real, passes: int
+) -> float:
+    """Move winding and step voltages towards the solved ones; returns the largest gap.
 
-    From the second pass on the step follows the secant through this pass and the last
-    (Anderson's mixing of depth one), which also ends cycles and creeping near collapse.
-    ``history`` (3, U + 1, 4): the last pass's voltages and gaps, and this pass's gaps.
+    The gap is in pu, of the largest voltage where that exceeds nominal. From the second pass
+    on the step follows the secant through this pass and the last (Anderson's mixing of depth
+    one), which also ends cycles and creeping near collapse; what wanders all the same takes
+    half steps after ``PATIENCE`` passes. ``history`` (3, U + 1, 4): the last pass's voltages
+    and gaps, and this pass's gaps.
     """
     unit_node, g, g_j, v_all, stub = tree.unit_node, work.g, work.g_j, work.v, work.stub
     units = unit_node.size
     sourced = tree.machine_unit.size > 0
     last = 4 if sourced else 3
     change = along = across = 0.0
+    largest = 1.0
     for unit in range(units + 1):
         if unit < units:
             v = times(load(g, unit), load_vector(v_all, unit_node[unit]))
@@ -569,19 +576,20 @@ def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, fi
             size = np.sqrt(value.real**2 + value.imag**2) / tree.v_nominal_v
             gap = size - unit_v_pu[unit, i]
             turn = gap - history[1, unit, i]
-            change = max(change, abs(gap))
+            change, largest = max(change, abs(gap)), max(largest, size)
             along += gap * turn
             across += turn * turn
             history[2, unit, i] = gap
-    back = 0.0 if first or across == 0.0 else along / across
+    back = 0.0 if passes == 1 or passes > PATIENCE or across == 0.0 else along / across
+    step = 0.5 if passes > PATIENCE else 1.0
     for unit in range(units + 1):
         for i in range(last):
             v_pu, gap = unit_v_pu[unit, i], history[2, unit, i]
             moved = v_pu - history[0, unit, i] + gap - history[1, unit, i]
-            unit_v_pu[unit, i] = max(v_pu + gap - back * moved, 0.0)
+            unit_v_pu[unit, i] = max(v_pu + step * gap - back * moved, 0.0)
             history[0, unit, i] = v_pu
             history[1, unit, i] = gap
-    return change
+    return change / largest
 
 
 @compiled
@@ -645,7 +653,7 @@ def solve_block(
             if tree.lifted:
                 flags |= lift_neutral(tree, work)
             descend(tree, state, work, s)
-            change = update_magnitudes(tree, work, unit_v_pu, history, passes == 1)
+            change = update_magnitudes(tree, work, unit_v_pu, history, passes)
             settled = linear or change <= tolerance_pu
         answer.flags[s] = flags if settled else flags | NOT_CONVERGED
         answer.passes[s] = passes

@@ -8,13 +8,14 @@ something: the EMF behind its impedance, its current, or its power.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .parts import Feeder, Load
+from .parts import Der, Feeder, Load
 from .states import Answer, State
 
 if TYPE_CHECKING:
@@ -58,22 +59,26 @@ def power_va(kw: float, power_factor: float) -> complex:
     return complex(p, math.copysign(p * math.sqrt(1.0 / power_factor**2 - 1.0), power_factor))
 
 
-def machines_of(feeder: Feeder, units: tuple[str, ...], motors: bool) -> Machines:
-    """The machines of a feeder whose units are named ``units``; ``motors``: in every load."""
+def machines_of(feeder: Feeder, units: Sequence[object], motors: bool) -> Machines:
+    """The machines of a feeder; ``motors``: in every load.
+
+    ``units`` are the parts that hang on nodes: transformers, and loads and DER without one.
+    """
     rows = [n for n, load in enumerate(feeder.loads) if motors or load.motor_share > 0.0]
     loads: list[Load] = [feeder.loads[n] for n in rows]
-    transformers = len(feeder.transformers)
+    names = [unit.name for unit in feeder.transformers]
 
-    def unit_of(name: str, transformer: str | None) -> int:
-        # a direct part's unit stands behind the transformers, whatever the names are
-        return units.index(name, transformers) if transformer is None else units.index(transformer)
+    def unit_of(part: Load | Der) -> int:
+        if part.transformer is not None:
+            return names.index(part.transformer)
+        return next(n for n, unit in enumerate(units) if unit is part)
 
     def admittance(z: complex | None) -> complex:
         return 0j if z is None else 1.0 / z
 
     ders = feeder.ders
     return Machines(
-        unit=np.array([unit_of(x.name, x.transformer) for x in [*loads, *ders]], np.int64),
+        unit=np.array([unit_of(part) for part in [*loads, *feeder.ders]], np.int64),
         motor_load=np.array(rows, np.int64),
         motor_share=np.array([load.motor_share for load in loads], np.float64),
         motor_y2_y1=np.array([load.motor_y2_y1 for load in loads], np.float64),

@@ -192,7 +192,7 @@ def compile_network(
             k = int(parent[k])
     edge_pieces.append(chord)
     units = _units(feeder)
-    machines = machines_of(feeder, tuple(unit.name for unit in units), motors)
+    machines = machines_of(feeder, units, motors)
     load_unit, load_y = _loads(feeder, units)
     source, neutral_y = feeder.source, _neutral_y(feeder.source)
     source_z = phase_matrix(source.z0_ohm, source.z1_ohm, source.z2_ohm)
@@ -383,7 +383,7 @@ def _span(feeder: Feeder, pieces: list[Piece]) -> tuple[list[str], dict[str, int
             raise InputError.single(
                 feeder.name,
                 f"switches: the loop at bus '{fork}'",
-                "two switches",
+                "two switches or regulators",
                 "must leave the bus by a line on one side at least",
             )
         order, parent_piece, _ = _walk(feeder.source.bus, pieces, {first})

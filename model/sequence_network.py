@@ -54,8 +54,11 @@ def sequence_network(feeder: Feeder, broken: Place) -> SequenceNetwork:
     ------
     ValueError
         Where a load is not a constant impedance, the feeder is not radial, the break
-        stands on no line, or a Yg/Δ unit has no leakage.
+        stands on no line, a Yg/Δ unit has no leakage, or the feeder has something that these
+        networks leave out: charging, magnetizing branches, motors, DER, capacitors, regulators,
+        an isolated neutral, an unknown connection.
     """
+    _refuse_beyond(feeder)
     if broken.line is None or broken.at is None:
         raise ValueError("the break must stand on a line")
     shunts = _shunts(feeder)
@@ -85,9 +88,27 @@ def sequence_network(feeder: Feeder, broken: Place) -> SequenceNetwork:
     )
 
 
+def _refuse_beyond(feeder: Feeder) -> None:
+    """Name what the sequence networks cannot represent."""
+    beyond = {
+        "charging": any(line.c1_nf_per_km or line.c0_nf_per_km for line in feeder.lines),
+        "magnetizing branches": any(unit.xm_pu is not None for unit in feeder.transformers),
+        "unknown connections": any(unit.connection == "unknown" for unit in feeder.transformers),
+        "motors": any(load.motor_share for load in feeder.loads),
+        "DER": bool(feeder.ders),
+        "capacitors": bool(feeder.capacitors),
+        "regulators": bool(feeder.regulators),
+        "an isolated neutral": feeder.source.neutral == "isolated",
+    }
+    found = [what for what, there in beyond.items() if there]
+    if found:
+        raise ValueError(f"{feeder.name}: sequence networks leave out {', '.join(found)}")
+
+
 def _source_ohm(feeder: Feeder) -> Complex:
     source = feeder.source
-    return np.array([source.z0_ohm, source.z1_ohm, source.z2_ohm])
+    z0_ohm = source.z0_ohm + 3.0 * source.neutral_ohm
+    return np.array([z0_ohm, source.z1_ohm, source.z2_ohm])
 
 
 def _node(feeder: Feeder, place: Place) -> str:
@@ -166,12 +187,12 @@ def transformer_admittance(unit: Transformer, base_ohm: float, y_s: complex) -> 
 
     * Yg/Yg: half the leakage, and behind it the magnetizing branch beside the other half
       with the load;
-    * Δ/Yg: nothing, its current has no way back from a Δ;
+    * Δ/Yg, Y/Δ and Δ/Δ: nothing, its current has no way back from a Δ or a Y;
     * Yg/Δ: the leakage alone, the closed Δ being a short circuit to it.
     """
     z = unit.leakage_pu * base_ohm
     series = y_s / (1.0 + z * y_s)
-    if unit.connection == "D/Yg":
+    if unit.connection in ("D/Yg", "Y/D", "D/D"):
         zero = 0j
     elif unit.connection == "Yg/D":
         if z == 0:
