@@ -16,7 +16,8 @@ only what a feeder in service cannot be. It sees
 
 It does not see: currents below ``least_a``; labels wrong at both ends alike, or currents alone
 wrong by whole rotations; a reversal of all currents in a closed loop or beside generation; one
-reversed transformer in a current that is itself very unbalanced.
+reversed transformer in a current that is itself very unbalanced. And beside generation together
+with much one-phase load a phase may rightly carry power against the others: a false alarm.
 """
 
 from __future__ import annotations

@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from oracles.scenes import Scene, connected, looks, opened, scene
+from oracles.scenes import Scene, connected, opened, scene
+from oracles.true_phasors import true_phasors
 
 from openphase.detector.criteria import Options, Reason, Settings, verdict
 from openphase.detector.evidence import Evidence, Phasors, evidence_of
 from openphase.detector.instruments import Bounds, draw_errors, measure
 from openphase.model import load_feeder
 from openphase.model.network import locate
-from openphase.model.points import into_line
 from openphase.model.solve import quiet_state
 from openphase.model.states import State
 
@@ -38,18 +38,6 @@ def loop() -> Scene:
 
 def paper(**options: object) -> Settings:
     return Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0, options=Options(**options))  # type: ignore[arg-type]
-
-
-def true_phasors(at: Scene, before: State, after: State) -> Phasors:
-    """What perfect instruments report."""
-    probe = 2 * at.points.edge + at.points.below
-    into = into_line(at.points)[:, None, None]
-    answers = looks(at, before), looks(at, after)
-    v, i = (
-        [getattr(a, x)[rows] for a in answers] for x, rows in (("v", at.points.node), ("i", probe))
-    )
-    both = np.stack(np.broadcast_arrays(*v)), np.stack(np.broadcast_arrays(*i)) * into
-    return Phasors(v=both[0], i=both[1])
 
 
 def seen(at: Scene, phasors: Phasors) -> Evidence:
