@@ -88,12 +88,11 @@ def allowed(grid: Grid, front: Front, margin: float) -> Mask:
         able = (front.cap_a < i_set_a) & (i_set_a <= front.di_a * margin)
         dv, z, cap = front.dv_pu[able], front.z_ohm[able], front.cap_a[able]
         with np.errstate(divide="ignore"):
-            # the least m that no longer trips; above 1, whatever the division rounds to
-            room = np.maximum(i_set_a / cap, np.nextafter(1.0, 2.0))
+            room = i_set_a / cap  # the least m that no longer trips
         # up to the margin itself, and below the room
         v = np.maximum(
             np.searchsorted(grid.v_set_pu, dv / margin, side="left"),
-            np.searchsorted(grid.v_set_pu, dv / room, side="right") * (room <= margin),
+            np.searchsorted(grid.v_set_pu, dv / room, side="right"),
         )
         z = np.minimum(
             np.searchsorted(grid.z_set_ohm, z * margin, side="right"),
