@@ -252,7 +252,7 @@ def test_the_model_needs_no_numpy() -> None:
         (
             "kv_ll = 12",
             "kv_ll = nan",
-            "f.toml:6: source: kv_ll must be a finite number, kV, > 0, got nan",
+            "f.toml:6: source: kv_ll must be a finite number, kV, > 0, <= 1000, got nan",
         ),
         (
             "z1_ohm = { mag = 0.9, deg = 85 }",
