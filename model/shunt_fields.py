@@ -49,6 +49,7 @@ TRANSFORMERS: tuple[Field, ...] = (
         name="leakage_pu",
         kind="impedance",
         unit="pu",
+        high=1.0,
         required=True,
         doc="Leakage on the rating, both halves together; 0 for `Yg/Yg` and `D/Yg` only.",
     ),

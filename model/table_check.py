@@ -12,6 +12,9 @@ from .fields import Field, Kind, as_toml, bounds_of, describe_field, did_you_mea
 
 __all__ = ["REPORTED", "check_table", "reason"]
 
+LEAST, MOST = 1e-12, 1e12
+"""Magnitudes beyond which a number is a slip: its square or reciprocal soon leaves the floats."""
+
 REPORTED: Final = object()
 """Stands in a table for a value whose fault has been reported where it was read."""
 
@@ -276,3 +279,5 @@ def _check_bounds(number: float, field: Field, what: str) -> None:
     )
     if not fits:
         raise _UnfitError(f"must {what or 'be '}{bounds_of(field)}")
+    if number != 0.0 and not LEAST <= abs(number) <= MOST:
+        raise _UnfitError(f"must {what or 'be '}0, or {LEAST:g} to {MOST:g} of either sign")

@@ -187,6 +187,7 @@ def _text(found: dict[str, Any]) -> str:
         ),
         "",
         *(_sections(found["sections"]) or ["no sections: nothing to size"]),
+        *(["?: the connection is unknown"] if _any_unknown(found["sections"]) else []),
         "",
         *_elements(found),
         *wrapped(_values(found)),
@@ -195,6 +196,10 @@ def _text(found: dict[str, Any]) -> str:
     for text in found["assumed"]:
         lines += wrapped(f"- {text}")
     return "\n".join(lines) + "\n"
+
+
+def _any_unknown(sections: list[dict[str, Any]]) -> bool:
+    return any(row["yg_d_unknown"] for row in sections)
 
 
 def _elements(found: dict[str, Any]) -> list[str]:
@@ -230,7 +235,7 @@ def _values(found: dict[str, Any]) -> str:
 
 
 def _sections(rows: list[dict[str, Any]]) -> list[str]:
-    """The table of the sections; none where there is no section. NAME?: connection unknown."""
+    """The table of the sections; none where there is no section."""
     if not rows:
         return []
     cells = [["section", "km", "|Z1| Ω", "downstream kW", "Yg/D known", "Yg/D possible", "inside"]]

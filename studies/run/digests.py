@@ -8,7 +8,7 @@ from dataclasses import replace
 from importlib import metadata, resources
 
 from ... import __version__
-from ...model.feeder_file import dump_feeder
+from ...model.feeder_file import feeder_content
 from ...model.parts import Feeder
 from .engine import BLOCK
 from .ledger import Attempt
@@ -27,7 +27,7 @@ def digest(*texts: str) -> str:
 def population_digest(feeder: Feeder, study: Study) -> str:
     """SHA-256 of what decides which scenarios there are, however it is written or called."""
     own = resolved(study, feeder)
-    return digest(dump_feeder(replace(feeder, name="any")), dump_population(own))
+    return digest(feeder_content(replace(feeder, name="any")), dump_population(own))
 
 
 def code_digest() -> str:
@@ -49,7 +49,7 @@ def manifest(
         "code_sha256": code_digest(),
         "python": platform.python_version(),
         "libraries": {name: metadata.version(name) for name in LIBRARIES},
-        "feeder_sha256": digest(dump_feeder(feeder)),
+        "feeder_sha256": digest(feeder_content(feeder)),
         "study_sha256": digest(dump_study(study)),
         "population_sha256": attempt.population,
         "seed": attempt.seed,

@@ -102,7 +102,7 @@ def test_parts_of_a_program_are_checked_like_those_of_a_file() -> None:
     with pytest.raises(InputError) as caught:
         feeder(source=replace(SOURCE, kv_ll=float("nan")), lines=(line("1", "S", "A", -5.0),))
     assert message(caught) == [
-        "f: source: kv_ll must be a finite number, kV, > 0, got nan",
+        "f: source: kv_ll must be a finite number, kV, > 0, <= 1000, got nan",
         "f: lines '1': length_km must be > 0, got -5.0",
         "2 faults",
     ]

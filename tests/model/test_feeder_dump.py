@@ -70,7 +70,7 @@ def random_feeder(seed: int) -> Feeder:
             place=place(),
             connection=connection,
             rating_kva=rng.uniform(5, 5000),
-            leakage_pu=z(0.001),
+            leakage_pu=complex(rng.uniform(0.001, 0.1), rng.uniform(0, 0.5)),
             x0_pu=maybe(rng.uniform(0.1, 9)) if connection in ("Yg/Yg", "unknown") else None,
             xm_pu=maybe(rng.uniform(20, 90)),
         )

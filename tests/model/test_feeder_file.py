@@ -252,7 +252,7 @@ def test_the_model_needs_no_numpy() -> None:
         (
             "kv_ll = 12",
             "kv_ll = nan",
-            "f.toml:6: source: kv_ll must be a finite number, kV, > 0, got nan",
+            "f.toml:6: source: kv_ll must be a finite number, kV, > 0, <= 1000, got nan",
         ),
         (
             "z1_ohm = { mag = 0.9, deg = 85 }",
@@ -308,6 +308,40 @@ def test_the_model_needs_no_numpy() -> None:
 )
 def test_one_fault(old: str, new: str, message: str) -> None:
     assert faults_of(changed(old, new)) == [message]
+
+
+@pytest.mark.parametrize(
+    ("found", "what"),
+    [
+        ("YNyn0", "a vector group, written Yg/Yg whatever its clock"),
+        ("Dyn11", "a vector group, written D/Yg whatever its clock"),
+        ("YNd1", "a vector group, written Yg/D whatever its clock"),
+        ("Yd5", "a vector group, written Y/D whatever its clock"),
+        ("dd0", "a vector group, written D/D whatever its clock"),
+        ("Yg/Y", "a low-voltage wye winding without a grounded neutral, which has no model"),
+        ("Δ/Y", "a low-voltage wye winding without a grounded neutral, which has no model"),
+        ("Yy0", "a low-voltage wye winding without a grounded neutral, which has no model"),
+        ("Y/Yg", "an ungrounded wye winding above a grounded one, whose neutral has no model"),
+        ("Zy", "a zigzag winding, which has no model"),
+        ("V/V", "an open bank of two units, which has no model"),
+        ("open-delta", "an open bank of two units, which has no model"),
+        ("single-phase", "a single-phase unit, which has no model: banks have three phases"),
+        ("SWER", "a single-phase unit, which has no model: banks have three phases"),
+        ("Yg/Yg/D", "a three-winding unit, which has no model"),
+    ],
+)
+def test_a_bank_without_model_is_refused_by_what_it_is(found: str, what: str) -> None:
+    (said,) = faults_of(changed('"Yg/Δ"', f'"{found}"'))
+    assert said == (
+        "f.toml:29: transformers 'T1': connection must be 'Yg/Yg' or 'D/Yg' or 'Yg/D' or 'Y/D'"
+        f" or 'D/D' or 'unknown', got {found!r}: {what}"
+    )
+
+
+@pytest.mark.parametrize("found", ["Yg/Q", "Yg-D", "yg/d", "delta/wye", "", "?"])
+def test_a_mistyped_bank_is_none_of_them(found: str) -> None:
+    (said,) = faults_of(changed('"Yg/Δ"', f'"{found}"'))
+    assert said.endswith(f", got {found!r}")
 
 
 def test_a_name_twice_is_reported_with_what_it_leaves_dangling() -> None:

@@ -61,6 +61,7 @@ def test_good_values(field: Field, raw: object, value: object) -> None:
     assert type(values["x"]) is type(value)
 
 
+MAGNITUDE = "0, or 1e-12 to 1e+12 of either sign"
 NUMBER = "must be a finite number"
 IMPEDANCE = "must be [r, x] or { mag = ..., deg = ... }"
 
@@ -93,6 +94,14 @@ IMPEDANCE = "must be [r, x] or { mag = ..., deg = ... }"
         (x("impedance"), {"mag": -1, "deg": 0}, f"{IMPEDANCE}, got {{ mag = -1, deg = 0 }}"),
         (x("impedance"), {}, f"{IMPEDANCE}, got {{}}"),
         (x("impedance", above=0.0), [0, 0], "must have a magnitude > 0, got [0, 0]"),
+        (x("number"), -1e-13, f"must be {MAGNITUDE}, got -1e-13"),
+        (x("number", above=0.0), 1e13, f"must be {MAGNITUDE}, got 10000000000000.0"),
+        (
+            x("impedance"),
+            [0, 1e13],
+            f"must have a magnitude {MAGNITUDE}, got [0, 10000000000000.0]",
+        ),
+        (x("numbers"), [1, 1e-320], f"must hold numbers {MAGNITUDE}, got [1, 1e-320]"),
         (x("impedance"), [-1e-9, 1], "must have a resistance >= 0, got [-1e-09, 1]"),
         (x("range"), [2, 1], "must be [low, high], low <= high, got [2, 1]"),
         (x("range"), [1, 2, 3], "must be [low, high], low <= high, got [1, 2, 3]"),

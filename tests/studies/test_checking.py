@@ -178,6 +178,7 @@ def test_everything_is_listed_with_what_was_assumed() -> None:
     assert sum(found["values"].values()) == len(feeder.origins)
     for said in (
         "12.47 kV, 4 wires, neutral petersen",
+        "\n?: the connection is unknown\n",
         "DER: roof (50 kW, constant_current), hydro (90 kW, generator)",
         "capacitors: bank (300 kvar, wye)",
         "regulators: booster (taps +2, 0, -1)",

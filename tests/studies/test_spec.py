@@ -640,9 +640,9 @@ def test_studies_that_differ_in_one_quantity_draw_the_others_alike() -> None:
             " got { first = 2, last = 1, step = 1 }",
         ),
         (
-            ("[device]", "i_set = { first = 1, last = 1e300, step = 1e-300 }"),
+            ("[device]", "i_set = { first = 1, last = 1e9, step = 1e-9 }"),
             "3: device: i_set must hold at most 10000 numbers,"
-            " got { first = 1, last = 1e+300, step = 1e-300 }",
+            " got { first = 1, last = 1000000000.0, step = 1e-09 }",
         ),
         (
             ("[device]", "z_set_ohm = { first = 1, last = 2, step = 1 }"),
