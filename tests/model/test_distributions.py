@@ -153,14 +153,13 @@ def test_choices_are_drawn_as_indices() -> None:
 def test_what_draws_whole_numbers() -> None:
     whole = [
         Fixed(value=2.0),
-        Uniform(low=3.0, high=3.0),
         Integers(least=0, most=1),
         Values(values=(-1.0, 2.0)),
     ]
     broken = [
         Fixed(value=2.5),
         Uniform(low=1.0, high=3.0),
-        Uniform(low=2.5, high=2.5),
+        Uniform(low=3.0, high=3.0),
         Values(values=(-1.0, 2.5)),
         Normal(mean=1.0, sd=1.0, low=0.0, high=3.0),
     ]
