@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pickle
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
@@ -64,7 +65,6 @@ from openphase.studies.run.spec_events import (
     LineFaultDraw,
     LoadSwapDraw,
     MotorStartDraw,
-    OpenWithDerTripDraw,
     OpenWithLoadStepDraw,
     ReclosingDraw,
     RegulatorTapDraw,
@@ -132,7 +132,7 @@ FULL = Study(
         fallen_source_side=FallenDraw(ohm=Uniform(low=40.0, high=1000.0)),
         fallen_load_side=FallenDraw(ohm=Fixed(value=40.0)),
         open_with_load_step=OpenWithLoadStepDraw(kw=Fixed(value=200.0)),
-        open_with_der_trip=OpenWithDerTripDraw(share=Fixed(value=1.0)),
+        open_with_der_trip=DerTripDraw(share=Fixed(value=1.0)),
         load_swap=LoadSwapDraw(kw=Fixed(value=500.0), ratio=Fixed(value=-0.9)),
         step_with_tap=StepWithTapDraw(kw=Fixed(value=50.0), pct=Uniform(low=-1.0, high=1.0)),
         wiring=WiringDraw(kinds=Choices(values=("ct_reversed", "labels_swapped"))),
@@ -206,6 +206,12 @@ def test_what_is_written_reads_back_the_same(written: Study) -> None:
     assert dump_study(study_from_toml(text, "dumped")) == text
 
 
+def test_a_study_goes_to_another_process_unchanged() -> None:
+    twin = pickle.loads(pickle.dumps(FULL))
+    assert twin == FULL
+    assert hash(twin) == hash(FULL)
+
+
 def test_a_dump_writes_every_default_out() -> None:
     text = dump_study(Study())
     for table, fields in TABLES.items():
@@ -256,7 +262,8 @@ def test_the_paper_s_study(paper: Feeder) -> None:
     assert shipped.ambient == Ambient(source_pct=0.3, load_pct=1.0)
     assert shipped.network == NetworkState(closed=())
     assert shipped.setting_groups() == (Group(name="normal", closed=()),)
-    assert shipped.events.without == shipped.correlations == ()
+    assert not shipped.events.without
+    assert not shipped.correlations
     assert shipped.events.open_phase == OpenPhaseDraw(two_phase_share=0.2)
     assert shipped.events.load_step == LoadStepDraw(
         kw=Uniform(low=10.0, high=500.0),
