@@ -23,7 +23,7 @@ from openphase.studies.run.engine import BLOCK
 from openphase.studies.run.ledger import Attempt
 from openphase.studies.run.spec import default_study
 from openphase.studies.run.store import RunFolder
-from openphase.studies.run.tally import Tested, Trained, device_grid, judge_block, train_block
+from openphase.studies.run.tally import Tested, Trained, judge_block, train_block
 
 MARGINS = (1.0, 1.05, 1.1, 1.25, 1.5)
 SEEDS = range(101, 109)
@@ -51,7 +51,7 @@ def main() -> None:
             for margin in MARGINS:
                 demand = replace(study.certificate, margin=margin)
                 own = make_case(feeder, replace(study, certificate=demand))
-                chosen = choices(own, device_grid(own), training)
+                chosen = choices(own, own.grid, training)
                 ways.append([as_settings(own, pair[0]) for pair in chosen])
         settings = tuple(zip(*ways, strict=True))
         blocks = planned_blocks(case, Purpose.VALIDATE, attempt(1, VALIDATION))

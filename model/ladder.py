@@ -595,7 +595,7 @@ def positive(v: Vector) -> complex:
 def is_linear(tree: Tree, state: State, s: int) -> bool:
     """Whether nothing in scenario ``s`` depends on the magnitude of a voltage."""
     exponent, follows, machine_va = state.exponent, state.machine_exponent, state.machine_va
-    linear = state.edge[s] < 0 or state.step_exponent[s] == 2.0
+    linear = bool(state.edge[s] < 0 or state.step_exponent[s] == 2.0)
     for n in range(exponent.shape[0]):
         linear &= exponent[n, s] == 2.0
     for m in range(follows.shape[0]):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,7 +95,7 @@ def machine_state(
     share: Real | None = None,
     y2_y1: Real | None = None,
     der_level: Real | None = None,
-) -> dict[str, NDArray[np.generic]]:
+) -> dict[str, Any]:
     """The fields of a `State` that depend on motors and DER, before any event.
 
     Parameters

@@ -44,7 +44,7 @@ from .run.session import (
 from .run.spec import Study, dump_study
 from .run.status import nearest_false_trip, refusal_text
 from .run.store import RunFolder, as_json, npz, pack
-from .run.tally import Trained, device_grid, train_block
+from .run.tally import Trained, train_block
 from .show.report import write_report
 from .show.sheet import settings_csv, sheet_table
 
@@ -92,7 +92,7 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     watch = Watch()
     trainings = tuple(_train(case, attempt, folder, demand.jobs) for case in cases)
     watch.lap("train_s")
-    chosen = choices(cases, device_grid(cases[0]), trainings)
+    chosen = choices(cases(cases[0]), trainings)
     watch.lap("choose_s")
     rivals = [
         [_rivals(case, t, own) for t, own in enumerate(own_group)]
@@ -167,7 +167,7 @@ def _train(case: Case, attempt: Attempt, folder: RunFolder, jobs: int) -> Traini
 
 def _counts(cases: Sequence[Case], trainings: Sequence[Training]) -> bytes:
     """What training knows of every representable setting, per row of the sheet."""
-    arrays = pack(device_grid(cases[0]), "grid")
+    arrays = pack(cases[0].grid, "grid")
     for n, (case, training) in enumerate(zip(cases, trainings, strict=True)):
         for t in case.judged.nonzero()[0]:
             row = n * len(case.judged) + int(t)

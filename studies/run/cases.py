@@ -13,6 +13,7 @@ from ...model.events.base import Places, places_on
 from ...model.network import CONNECTIONS, Network, compile_network
 from ...model.parts import Feeder
 from ...model.points import Points, Terminal, find_points
+from ...optimise.counts import Grid
 from .classes import DrawClass
 from .spec import Study
 from .spec_events import CLASSES, SwitchState
@@ -57,6 +58,7 @@ class Case:
     unknown_connections: NDArray[np.int64]  #: (choices,) their codes in the solver
     judged: NDArray[np.bool_]  #: (T,) terminals whose settings are live in this group
     drawn: tuple[DrawClass, ...]  #: classes that the study asks for and the feeder can have
+    grid: Grid  #: the settings that the device can hold
 
     @property
     def wired(self) -> Wired:
@@ -123,6 +125,16 @@ def _case(
         unknown_connections=np.array([CONNECTIONS[name] for name in choices.values], np.int64),
         judged=judged,
         drawn=_drawn(feeder, study, bool(ties), bool(transfers)),
+        grid=_grid(study),
+    )
+
+
+def _grid(study: Study) -> Grid:
+    device = study.device
+    return Grid(
+        i_set_a=np.array(device.i_grid()),
+        v_set_pu=np.array(device.v_grid_pu()),
+        z_set_ohm=np.array(device.z_grid()),
     )
 
 

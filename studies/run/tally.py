@@ -11,7 +11,7 @@ from ...detector.criteria import Options, Reason, Settings, reach_of, verdict
 from ...detector.evidence import only
 from ...model.breaks import DEAD, FLOATING
 from ...model.states import NOT_CONVERGED
-from ...optimise.counts import Corners, Grid, corners_of
+from ...optimise.counts import Corners, corners_of
 from ...optimise.staircase import Front, front_of
 from .along import distance_share
 from .cases import Case
@@ -20,7 +20,7 @@ from .draw import BlockId, draw_scenarios
 from .engine import BLOCK, Observed, observe, options_of
 from .verdicts import pack_verdicts
 
-__all__ = ["PLACES", "Tested", "Trained", "device_grid", "judge_block", "train_block"]
+__all__ = ["PLACES", "Tested", "Trained", "judge_block", "train_block"]
 
 PLACES = 40  #: stretches of a section in which breaks are counted for the profile
 KEPT = 40  #: scenarios of a block whose evidence is kept for pictures
@@ -60,21 +60,11 @@ class Tested:
     sample_side: NDArray[np.int8]  #: (T, KEPT)
 
 
-def device_grid(case: Case) -> Grid:
-    """The settings that the study's device can hold."""
-    device = case.study.device
-    return Grid(
-        i_set_a=np.array(device.i_grid()),
-        v_set_pu=np.array(device.v_grid_pu()),
-        z_set_ohm=np.array(device.z_grid()),
-    )
-
-
 def train_block(case: Case, which: BlockId, size: int = BLOCK) -> Trained:
     """Draw and judge a training block for every setting of the device at once."""
     options = options_of(case.study)
     seen = observe(case, draw_scenarios(case, which, size), options)
-    grid, margin = device_grid(case), case.study.certificate.margin
+    grid, margin = case.grid, case.study.certificate.margin
     reach = reach_of(seen.evidence, options)
     rows, identity = _rows(which.drawn, seen), _identity(which, size)
     opens, stiff, false, front = [], [], [], []
@@ -201,7 +191,7 @@ _KINDS = np.array([own.kind for own in REPORTED] + [""])
 
 def _of_kind(kind: str, rows: Int) -> Flags:
     """Events that count in rows of this kind."""
-    return np.asarray((kind == _KINDS)[rows])
+    return np.asarray(np.equal(_KINDS, kind)[rows])
 
 
 def _counted(rows: Int, among: Flags | None = None) -> Int:

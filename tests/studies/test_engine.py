@@ -18,7 +18,7 @@ from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case
 from openphase.studies.run.engine import Observed, observe
 from openphase.studies.run.spec import Study, default_study
 from openphase.studies.run.store import pack
-from openphase.studies.run.tally import Trained, device_grid, judge_block, train_block
+from openphase.studies.run.tally import Trained, judge_block, train_block
 
 SIZE = 300
 MARGIN = 1.25
@@ -57,7 +57,7 @@ def must_not_trip(drawn: DrawClass, seen: Observed, t: int) -> np.ndarray:
 
 def random_settings(case: Case, count: int) -> list[tuple[tuple[int, int, int], Settings]]:
     """Cells of the device's grid and their settings; half of them where things happen."""
-    grid, rng = device_grid(case), np.random.default_rng(2)
+    grid, rng = case.grid, np.random.default_rng(2)
     found = []
     for n in range(count):
         high = grid.shape if n % 2 else (7, 20, 80)
@@ -83,7 +83,7 @@ def test_corners_count_what_the_verdicts_say_at_any_setting(
     trained: dict[DrawClass, Trained],
     drawn: DrawClass,
 ) -> None:
-    grid, own, known = device_grid(case), trained[drawn], seen[drawn]
+    grid, own, known = case.grid, trained[drawn], seen[drawn]
     settings = random_settings(case, 200)
     trip = np.array([verdict(known.evidence, one) == Reason.TRIP for _, one in settings])
     counted = 0
@@ -106,7 +106,7 @@ def test_stiff_corners_are_breaks_seen_through_the_margin(
 ) -> None:
     """What is still found with I and Z raised and V lowered by the margin."""
     known, own = seen[DrawClass.OPEN_PHASE], trained[DrawClass.OPEN_PHASE]
-    grid = device_grid(case)
+    grid = case.grid
     reach = reach_ohm(known.evidence, True)
     for t, terminal in enumerate(case.points.terminals):
         if terminal.load_side:
