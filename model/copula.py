@@ -1,7 +1,7 @@
 """Uniform numbers that go together: a Gaussian copula with given rank correlations.
 
 Normal variables of correlation ρ have Spearman's rank correlation r = 6/π·asin(ρ/2), and
-keep it under every rising function of each (Kruskal 1958, section 6). So ρ = 2·sin(π·r/6),
+keep it under every rising function of each (Pearson 1907). So ρ = 2·sin(π·r/6),
 and any distributions' quantiles of the uniform numbers have rank correlation r; where a
 distribution holds few different numbers, ties bring it nearer to 0.
 """

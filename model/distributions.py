@@ -113,11 +113,6 @@ class Uniform(Distribution):
         """The ends."""
         return self.low, self.high
 
-    @property
-    def whole(self) -> bool:
-        """Whether the ends are one whole number."""
-        return self.low == self.high and float(self.low).is_integer()
-
     def fault(self) -> str | None:
         """Demand ends in order."""
         return None if self.low <= self.high else "must be [low, high], low <= high"

@@ -26,7 +26,6 @@ __all__ = [
     "LoadSwapDraw",
     "MotorStartDraw",
     "OpenPhaseDraw",
-    "OpenWithDerTripDraw",
     "OpenWithLoadStepDraw",
     "ReclosingDraw",
     "RegulatorTapDraw",
@@ -80,7 +79,6 @@ WIRING_KINDS: dict[str, tuple[Wiring, ...]] = {
 
 _LOAD_KW = Uniform(low=10.0, high=500.0)
 _TO_EARTH_OHM = Lognormal(median=200.0, sigma=1.0, low=20.0, high=2000.0)
-_ANY_SHARE = Uniform(low=0.0, high=1.0)
 
 
 # ---- open phases ----
@@ -340,7 +338,7 @@ class ReclosingDraw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DerTripDraw:
-    """DER trip.
+    """DER trip, by themselves or upon a break within ΔT.
 
     Parameters
     ----------
@@ -348,7 +346,7 @@ class DerTripDraw:
         Share of the units that trip, any of them; at least one does.
     """
 
-    share: Distribution = _ANY_SHARE
+    share: Distribution = Uniform(low=0.0, high=1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -362,19 +360,6 @@ class DerRampDraw:
     """
 
     factor: Distribution = Uniform(low=0.7, high=1.3)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OpenWithDerTripDraw:
-    """A break, upon which DER trip within ΔT.
-
-    Parameters
-    ----------
-    share
-        Share of the units that trip, any of them; at least one does.
-    """
-
-    share: Distribution = _ANY_SHARE
 
 
 # ---- wiring ----
@@ -415,7 +400,7 @@ class Events:
     fallen_source_side: FallenDraw = FallenDraw()
     fallen_load_side: FallenDraw = FallenDraw()
     open_with_load_step: OpenWithLoadStepDraw = OpenWithLoadStepDraw()
-    open_with_der_trip: OpenWithDerTripDraw = OpenWithDerTripDraw()
+    open_with_der_trip: DerTripDraw = DerTripDraw()
     load_swap: LoadSwapDraw = LoadSwapDraw()
     step_with_tap: StepWithTapDraw = StepWithTapDraw()
     wiring: WiringDraw = WiringDraw()

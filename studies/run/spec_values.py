@@ -24,7 +24,7 @@ from ...model.errors import KeyPath, Report
 from ...model.fields import Field, Kind, as_toml, bounds_of, describe_field, did_you_mean
 from ...model.table_check import check_table
 
-__all__ = ["READERS", "Reader", "as_table"]
+__all__ = ["READERS", "Reader", "as_table", "distribution_text"]
 
 Reader = Callable[[object, Field, KeyPath, Report], object]
 
@@ -210,3 +210,35 @@ def _plain(value: object) -> object:
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
     return as_table(value) if is_dataclass(value) else value
+
+
+# ---- telling ----
+
+
+def distribution_text(drawn: Distribution | Choices) -> str:
+    """Return what is drawn, in words for a report.
+
+    Examples
+    --------
+    >>> distribution_text(Uniform(low=0.25, high=1.0))
+    '0.25 to 1'
+    >>> distribution_text(Choices(values=("D/Yg", "Yg/Yg"), weights=(3.0, 1.0)))
+    'D/Yg (75 %) or Yg/Yg (25 %)'
+    """
+    if isinstance(drawn, (Values, Choices)):
+        weights = drawn.weights or (1.0,) * len(drawn.values)
+        shares = [f" ({weight / sum(weights):.0%})".replace("%", " %") for weight in weights]
+        names = [item if isinstance(item, str) else f"{item:g}" for item in drawn.values]
+        return " or ".join(
+            name + (share if drawn.weights else "")
+            for name, share, weight in zip(names, shares, weights, strict=True)
+            if weight
+        )
+    low, high = (f"{end:g}" for end in drawn.support)
+    if isinstance(drawn, Normal):
+        return f"normal, {drawn.mean:g} ± {drawn.sd:g}, from {low} to {high}"
+    if isinstance(drawn, Lognormal):
+        return f"lognormal, median {drawn.median:g}, σ {drawn.sigma:g}, from {low} to {high}"
+    if isinstance(drawn, Triangular):
+        return f"{low} to {high}, likeliest {drawn.mode:g}"
+    return low if low == high else f"{low} to {high}"

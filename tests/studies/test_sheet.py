@@ -10,7 +10,7 @@ from openphase.model import load_feeder
 from openphase.model.network import compile_network
 from openphase.model.points import find_points
 from openphase.studies.run.certify import COMPARED
-from openphase.studies.run.spec_parts import Device, Steps
+from openphase.studies.run.spec import Device, Steps
 from openphase.studies.show.sheet import (
     setting_text,
     sheet_table,
@@ -81,7 +81,7 @@ def answer(local: str = "R1", remote: str = "R2", feeder: str = "made up") -> di
 @pytest.mark.parametrize("step", [0.05, 0.25, 0.125, 0.001])
 def test_every_setting_of_a_fine_device_is_printed_as_it_is(step: float) -> None:
     steps = Steps(first=step, last=40 * step, step=step)
-    device = Device(i_set_a=steps, z_set_ohm=(steps,), v_set_pct=steps.values())
+    device = Device(i_set=steps, z_set_ohm=(steps,), v_set_pct=steps.values())
     for exact, value in zip(device.i_grid(), device.v_grid_pu(), strict=True):
         assert float(setting_text(exact)) == exact
         assert setting_text(value * 100.0) == setting_text(exact)
