@@ -11,23 +11,28 @@ from oracles.scenes import Pair, Scene, change, scene
 
 from openphase.detector.criteria import Options, Reason, Settings, verdict
 from openphase.detector.evidence import Evidence, Phasors, evidence_of
+from openphase.model import load_feeder
 from openphase.model.events.base import apply_event, no_event
 from openphase.model.machines import carried_over
 from openphase.model.network import locate
-from openphase.model.parts import Feeder
+from openphase.model.parts import Der, DerModel, Feeder
 from openphase.model.points import into_line
 from openphase.model.solve import solve
-from openphase.model.states import NOT_CONVERGED, Answer, State
+from openphase.model.states import NOT_CONVERGED, Answer
 
 __all__ = [
+    "ALL",
     "ANY_SEQUENCE",
     "FALLBACK",
+    "ONE",
     "PAPER",
+    "TWO",
     "Seen",
     "happen",
     "scene_of",
     "seen",
     "three_phase_s",
+    "with_pv",
 ]
 
 Complex = NDArray[np.complex128]
@@ -36,6 +41,9 @@ Complex = NDArray[np.complex128]
 PAPER = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0, options=Options(fallback=False))
 FALLBACK = replace(PAPER, options=Options())
 ANY_SEQUENCE = replace(PAPER, options=Options(fallback=False, any_sequence=True))
+
+#: phases open, as a mask of each scenario
+ONE, TWO, ALL = np.array([0b001]), np.array([0b011]), np.array([0b111])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,8 +90,6 @@ def happen(
     at: Scene,
     line: str | None = None,
     fraction: float = 0.0,
-    *,
-    state: State | None = None,
     **event: Any,
 ) -> tuple[Answer, Answer]:
     """The answers before and after; fields of `Event` as keywords, one scenario."""
@@ -91,8 +97,7 @@ def happen(
     if line is not None:
         edge, share = locate(at.network, line, fraction)
         own = replace(own, edge=np.array([edge]), share=np.array([share]))
-    quiet = at.steady if state is None else state
-    before, after = apply_event(at.network, quiet, quiet, own)
+    before, after = apply_event(at.network, at.steady, at.steady, own)
     first = solve(at.network, before)
     after = carried_over(at.network, before, first, after, own.der_factor)
     then = solve(at.network, after, start=first.unit_v_pu)
@@ -122,3 +127,19 @@ def seen(at: Scene, frames: tuple[Answer, Answer], local: str = "R2", remote: st
 def scene_of(feeder: Feeder, *, tie_closed: bool = False) -> Scene:
     """The paper's feeder, or one like it, with its tie open or closed."""
     return scene(feeder, frozenset({"R4"}) if tie_closed else None)
+
+
+def with_pv(model: DerModel, kw: float = 700.0, z1_ohm: complex | None = None) -> Feeder:
+    """The paper's feeder with generation behind T6, which has no other sequences."""
+    pv = Der(
+        name="PV",
+        transformer="T6",
+        place=None,
+        kw=kw,
+        power_factor=1.0,
+        model=model,
+        z1_ohm=z1_ohm,
+        z2_ohm=None,
+        z0_ohm=None,
+    )
+    return replace(load_feeder("paper"), ders=(pv,))
