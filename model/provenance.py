@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -108,16 +108,15 @@ def assumptions(feeder: Feeder) -> list[str]:
     >>> assumptions(load_feeder("paper"))[:2]
     ['source: z2_ohm as z1_ohm', 'source: z0_ohm as z1_ohm']
     """
+    known: defaultdict[tuple[str, str], list[tuple[str, Origin]]] = defaultdict(list)
+    for (table, name, key), origin in feeder.origins.items():
+        known[table, key].append((str(name), origin))
     lines = []
     for table, fields in TABLES.items():
         for field in fields:
-            own = [
-                (name, origin)
-                for (at, name, key), origin in feeder.origins.items()
-                if (at, key) == (table, field.name)
-            ]
+            own = known[table, field.name]
             for wanted in ("default", "unknown"):
-                rows = [str(name) for name, origin in own if origin == wanted]
+                rows = [name for name, origin in own if origin == wanted]
                 if rows:
                     whose = "" if table == "source" else f" ({_whose(rows, len(own))})"
                     lines.append(f"{table}: {field.name} {_assumed(field, wanted)}{whose}")
