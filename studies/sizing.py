@@ -92,7 +92,7 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     watch = Watch()
     trainings = tuple(_train(case, attempt, folder, demand.jobs) for case in cases)
     watch.lap("train_s")
-    chosen = choices(cases(cases[0]), trainings)
+    chosen = choices(cases, cases[0].grid, trainings)
     watch.lap("choose_s")
     rivals = [
         [_rivals(case, t, own) for t, own in enumerate(own_group)]
