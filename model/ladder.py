@@ -31,13 +31,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .bank import YG_D, bank, plain_bank
-from .breaks import DEAD, FLOATING, SINGULAR, open_phases, squared
+from .assemble import set_admittances
+from .breaks import FLOATING, SINGULAR, squared
 from .compiled import compiled
+from .event_node import climb_event, cross, descend_event
 from .matrix3 import (
     ZERO,
-    Matrix,
-    Vector,
     add,
     column_sums,
     inverse,
@@ -45,198 +44,20 @@ from .matrix3 import (
     load_vector,
     minus,
     plus,
-    plus_diagonal,
-    product,
     reciprocal,
     scaled,
     store,
     store_vector,
     times,
 )
+from .series import both, carry, carry_current, up
+from .settle import is_linear, positive, update_magnitudes
 from .states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 
 __all__ = ["solve_block"]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-
-PATIENCE = 60  #: passes of a fixed point before it takes half steps
-
-
-@compiled
-def up(y: Matrix, z: Matrix) -> tuple[Matrix, Matrix]:
-    """F and W of the series impedance ``z`` above ``y``."""
-    f = inverse(plus_diagonal(product(z, y), (1 + 0j, 1 + 0j, 1 + 0j)))
-    return f, product(y, f)
-
-
-@compiled
-def carry(
-    y: Matrix, z: Matrix, f: Matrix, x: Matrix, xt: Matrix, u: Matrix
-) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-    """H and the fill X, X', U past the series impedance ``z`` above ``y``."""
-    h = scaled(product(f, product(z, x)), -1.0)
-    return h, add(x, product(y, h)), product(xt, f), add(u, product(xt, h))
-
-
-@compiled
-def carry_current(
-    y: Matrix, z: Matrix, f: Matrix, x_j: Vector, xt: Matrix, u_j: Vector
-) -> tuple[Vector, Vector, Vector]:
-    """The last column of H, X and U past ``z`` above ``y``; ``xt`` is X' below ``z``."""
-    h_j = minus(times(f, times(z, x_j)))
-    return h_j, plus(x_j, times(y, h_j)), plus(u_j, times(xt, h_j))
-
-
-@compiled
-def set_admittances(
-    tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
-) -> None:
-    """What hangs on every node and on the event node, at the winding voltages ``unit_v_pu``."""
-    set_loads(tree, state, work, s, unit_v_pu, floor_pu)
-    y, y_j, g, unit_y = work.y, work.y_j, work.g, work.unit_y
-    unit_node, plain, connections = tree.unit_node, tree.unit_plain, state.connection
-    zh, zl, y0 = tree.unit_zh_ohm, tree.unit_zl_ohm, tree.unit_y0_s
-    shunts = tree.shunt_s
-    for k in range(y.shape[0]):
-        store(y, k, load(shunts, k))
-        store_vector(y_j, k, (0j, 0j, 0j))
-    for unit in range(unit_node.size):
-        node, connection = unit_node[unit], connections[unit, s]
-        if not plain[unit] or connection > YG_D:
-            hang_bank(tree, work, unit, connection)
-            continue
-        across = (unit_y[unit, 0, 0], unit_y[unit, 1, 1], unit_y[unit, 2, 2])
-        shunt, winding = plain_bank(connection, zh[unit], zl[unit], y0[unit], across)
-        store(y, node, add(load(y, node), shunt))
-        store(g, unit, winding)
-    if tree.charged:
-        add_charging(tree, work, state.edge[s])
-    node = state.far_node[s]
-    if node >= 0:
-        far_y, far_between_y = state.far_y_s, state.far_between_y_s
-        for i in range(3):
-            add_shunt(y, node, i, far_y[i, s], far_between_y[i, s])
-    set_event_shunts(tree, state, work, s, unit_v_pu, floor_pu)
-
-
-@compiled
-def hang_bank(tree: Tree, work: Work, unit: int, connection: int) -> None:
-    """Hang a bank with machines, a magnetizing branch or rarer windings on its node."""
-    y, y_j, node = work.y, work.y_j, tree.unit_node[unit]
-    shunt, drawn, winding, fed = bank(
-        connection,
-        tree.unit_zh_ohm[unit],
-        tree.unit_zl_ohm[unit],
-        tree.unit_y0_s[unit],
-        tree.unit_ym_s[unit],
-        load(work.unit_y, unit),
-        load_vector(work.unit_j, unit),
-    )
-    store(y, node, add(load(y, node), shunt))
-    store_vector(y_j, node, plus(load_vector(y_j, node), drawn))
-    store(work.g, unit, winding)
-    store_vector(work.g_j, unit, fed)
-
-
-@compiled
-def set_loads(
-    tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
-) -> None:
-    """Admittance across the LV windings of every unit, and the current fed in there."""
-    unit_y, unit_j = work.unit_y, work.unit_j
-    load_unit, load_y, machine_unit = tree.load_unit, tree.load_y_s, tree.machine_unit
-    load_scale, exponent = state.load_scale, state.exponent
-    machine_va, machine_y, machine_j = state.machine_va, state.machine_y_s, state.machine_j_a
-    follows = state.machine_exponent
-    for unit in range(unit_y.shape[0]):
-        store(unit_y, unit, ZERO)
-        store_vector(unit_j, unit, (0j, 0j, 0j))
-    for n in range(load_unit.size):
-        unit = load_unit[n]
-        nominal = load_y[n] * load_scale[n, s]
-        power = exponent[n, s] - 2.0
-        for i in range(3):
-            unit_y[unit, i, i] += nominal * voltage_factor(unit_v_pu[unit, i], power, floor_pu)
-    turn = complex(-0.5, 0.75**0.5)
-    for m in range(machine_unit.size):
-        unit = machine_unit[m]
-        power = follows[m, s] - 2.0
-        taken = machine_va[m, s].conjugate() / (3.0 * tree.v_nominal_v**2)
-        y0, y2 = machine_y[m, 0, s], machine_y[m, 2, s]
-        y1 = machine_y[m, 1, s] + taken * voltage_factor(unit_v_pu[unit, 3], power, floor_pu)
-        own = (y0 + y1 + y2) / 3.0
-        ahead = (y0 + turn * y1 + turn.conjugate() * y2) / 3.0
-        behind = (y0 + turn.conjugate() * y1 + turn * y2) / 3.0
-        add_circulant(unit_y, unit, own, ahead, behind)
-        j = machine_j[m, s]
-        store_vector(
-            unit_j, unit, plus(load_vector(unit_j, unit), (j, j * turn.conjugate(), j * turn))
-        )
-
-
-@compiled
-def add_circulant(stack: Complex, k: int, own: complex, ahead: complex, behind: complex) -> None:
-    """Add to matrix k the one with ``own`` on its diagonal and ``ahead`` right of it."""
-    matrix = (own, ahead, behind, behind, own, ahead, ahead, behind, own)
-    store(stack, k, add(load(stack, k), matrix))
-
-
-@compiled
-def add_shunt(stack: Complex, k: int, i: int, earth: complex, between: complex) -> None:
-    """Add to matrix k what lies from phase i to earth, and from it to the phase after it."""
-    following = (i + 1) % 3
-    stack[k, i, i] += earth + between
-    stack[k, following, following] += between
-    stack[k, i, following] -= between
-    stack[k, following, i] -= between
-
-
-@compiled
-def add_charging(tree: Tree, work: Work, edge: int) -> None:
-    """Half of every edge's charging at its ends; of the event's edge the parts beyond it."""
-    y, parents, end_y = work.y, tree.parent, tree.end_y_s
-    last = parents.size
-    for k in range(1, last + (1 if tree.tail >= 0 else 0)):
-        if k == edge:
-            continue
-        half = load(end_y, k)
-        upper, lower = (tree.tail, tree.fork) if k == last else (parents[k], k)
-        store(y, upper, add(load(y, upper), half))
-        store(y, lower, add(load(y, lower), half))
-
-
-@compiled
-def set_event_shunts(
-    tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
-) -> None:
-    """Shunts at p and q; and the charging of the two parts of the event's edge."""
-    event_y, edge, share = work.event_y, state.edge[s], state.share[s]
-    store(event_y, 0, ZERO)
-    store(event_y, 1, ZERO)
-    if edge < 0:
-        return
-    step_y, between_y, fallen_y = state.step_y_s, state.between_y_s, state.fallen_y_s
-    power = state.step_exponent[s] - 2.0
-    for i in range(3):
-        factor = voltage_factor(unit_v_pu[-1, i], power, floor_pu)
-        add_shunt(event_y, 0, i, step_y[i, s] * factor, between_y[i, s])
-        event_y[1, i, i] += fallen_y[i, s]
-    if tree.charged:
-        half = load(tree.end_y_s, edge)
-        above, below = scaled(half, share), scaled(half, 1.0 - share)
-        last = tree.parent.size
-        upper, lower = (tree.tail, tree.fork) if edge == last else (tree.parent[edge], edge)
-        store(event_y, 0, add(load(event_y, 0), above))
-        store(event_y, 1, add(load(event_y, 1), below))
-        store(work.y, upper, add(load(work.y, upper), above))
-        store(work.y, lower, add(load(work.y, lower), below))
-
-
-@compiled
-def voltage_factor(v_pu: float, power: float, floor_pu: float) -> float:
-    """Admittance over nominal admittance: |V|**(exponent - 2), constant below the floor."""
-    return 1.0 if power == 0.0 else float(np.exp(power * np.log(max(v_pu, floor_pu))))
 
 
 @compiled
@@ -323,76 +144,6 @@ def regulate(work: Work, k: int, ratio: Real, row: int, s: int, looped: bool) ->
 
 
 @compiled
-def climb_event(
-    work: Work, k: int, y: Matrix, z: Matrix, share: float, mask: int, looped: bool, x_j: Vector
-) -> int:
-    """Eliminate edge k with the event node on it; returns flags."""
-    here, here_j = work.here, work.here_j
-    z_low = scaled(z, 1.0 - share)
-    f, w = up(y, z_low)
-    h = x = xt = u = ZERO
-    u_j = (0j, 0j, 0j)
-    if looped:
-        xt, u, u_j = load(work.fill, 0), load(work.fill, 1), load_vector(work.fill_j, 0)
-    h_j, x_j, u_j = carry_current(y, z_low, f, x_j, xt, u_j)
-    if looped:
-        h, x, xt, u = carry(y, z_low, f, load(work.x, k), xt, u)
-    store(work.event, 4, f)
-    store(work.event, 5, h)
-    store_vector(work.event_j, 2, h_j)
-    store(here, 0, w)
-    store(here, 1, x)
-    store(here, 2, xt)
-    store(here, 3, u)
-    store_vector(here_j, 0, x_j)
-    store_vector(here_j, 1, u_j)
-    fed = x_j[0] != 0.0 or x_j[1] != 0.0 or x_j[2] != 0.0
-    flags = cross(work, scaled(z, share), mask, 1)
-    if mask == 7 and not looped and not fed:
-        flags |= DEAD
-    store(work.w, k, load(here, 0))
-    store_vector(work.x_j, k, load_vector(here_j, 0))
-    if looped:
-        store(work.x, k, load(here, 1))
-        store(work.fill, 0, load(here, 2))
-        store(work.fill, 1, load(here, 3))
-        store_vector(work.fill_j, 0, load_vector(here_j, 1))
-    return flags
-
-
-@compiled
-def cross(work: Work, z: Matrix, mask: int, below: int) -> int:
-    """Climb over the event node and the series impedance ``z`` above it; returns flags.
-
-    What is below stands in ``work.here``, and what is seen from above ``z`` replaces it.
-    ``below`` is the side that is met first: 1 for q, 0 for p.
-    """
-    here, here_j, event, event_j = work.here, work.here_j, work.event, work.event_j
-    store(here, 0, add(load(here, 0), load(work.event_y, below)))
-    flags = 0
-    if mask:
-        flags = open_phases(mask, here, here_j)
-        store(event, 2, load(here, 4))
-        store(event, 3, load(here, 5))
-        store_vector(event_j, 1, load_vector(here_j, 2))
-    y = add(load(here, 0), load(work.event_y, 1 - below))
-    f, w = up(y, z)
-    xt = load(here, 2)
-    h_j, x_j, u_j = carry_current(y, z, f, load_vector(here_j, 0), xt, load_vector(here_j, 1))
-    h, x, xt, u = carry(y, z, f, load(here, 1), xt, load(here, 3))
-    store(event, 0, f)
-    store(event, 1, h)
-    store_vector(event_j, 0, h_j)
-    store(here, 0, w)
-    store(here, 1, x)
-    store(here, 2, xt)
-    store(here, 3, u)
-    store_vector(here_j, 0, x_j)
-    store_vector(here_j, 1, u_j)
-    return flags
-
-
-@compiled
 def climb_chord(tree: Tree, work: Work, happening: bool, share: float, mask: int) -> int:
     """Add the chord to the tail's Y and start the fill; returns flags.
 
@@ -431,12 +182,6 @@ def climb_chord(tree: Tree, work: Work, happening: bool, share: float, mask: int
     store_vector(work.fill_j, 0, (0j, 0j, 0j))
     store(work.y, tree.tail, add(load(work.y, tree.tail), w))
     return flags
-
-
-@compiled
-def both(a: Matrix, v: Vector, b: Matrix, v_fork: Vector) -> Vector:
-    """``a @ v + b @ v_fork``."""
-    return plus(times(a, v), times(b, v_fork))
 
 
 @compiled
@@ -519,18 +264,6 @@ def descend(tree: Tree, state: State, work: Work, s: int) -> None:
 
 
 @compiled
-def descend_event(work: Work, near: int, above: Vector, v_fork: Vector, mask: int) -> Vector:
-    """Voltages of both stubs, ``near`` (0 for p) first; returns that of the other."""
-    event, event_j = work.event, work.event_j
-    v = plus(both(load(event, 0), above, load(event, 1), v_fork), load_vector(event_j, 0))
-    store_vector(work.stub, near, v)
-    if mask:
-        v = plus(both(load(event, 2), v, load(event, 3), v_fork), load_vector(event_j, 1))
-    store_vector(work.stub, 1 - near, v)
-    return v
-
-
-@compiled
 def add_charging_currents(tree: Tree, work: Work, edge: int, share: float) -> None:
     """The currents at an edge's ends include what charges that end of it."""
     parents, end_y, v, i_up, i_low = tree.parent, tree.end_y_s, work.v, work.i_up, work.i_low
@@ -544,71 +277,6 @@ def add_charging_currents(tree: Tree, work: Work, edge: int, share: float) -> No
         for i in range(3):
             i_up[k, i] += above * first[i]
             i_low[k, i] -= below * second[i]
-
-
-@compiled
-def update_magnitudes(
-    tree: Tree, work: Work, unit_v_pu: Real, history: Real, passes: int
-) -> float:
-    """Move winding and step voltages towards the solved ones; returns the largest gap.
-
-    The gap is in pu, of the largest voltage where that exceeds nominal. From the second pass
-    on the step follows the secant through this pass and the last (Anderson's mixing of depth
-    one), which also ends cycles and creeping near collapse; what wanders all the same takes
-    half steps after ``PATIENCE`` passes. ``history`` (3, U + 1, 4): the last pass's voltages
-    and gaps, and this pass's gaps.
-    """
-    unit_node, g, g_j, v_all, stub = tree.unit_node, work.g, work.g_j, work.v, work.stub
-    units = unit_node.size
-    sourced = tree.machine_unit.size > 0
-    last = 4 if sourced else 3
-    change = along = across = 0.0
-    largest = 1.0
-    for unit in range(units + 1):
-        if unit < units:
-            v = times(load(g, unit), load_vector(v_all, unit_node[unit]))
-            if sourced:
-                v = plus(v, load_vector(g_j, unit))
-        else:
-            v = load_vector(stub, 0)
-        for i in range(last):
-            value = v[i] if i < 3 else positive(v)
-            size = np.sqrt(value.real**2 + value.imag**2) / tree.v_nominal_v
-            gap = size - unit_v_pu[unit, i]
-            turn = gap - history[1, unit, i]
-            change, largest = max(change, abs(gap)), max(largest, size)
-            along += gap * turn
-            across += turn * turn
-            history[2, unit, i] = gap
-    back = 0.0 if passes == 1 or passes > PATIENCE or across == 0.0 else along / across
-    step = 0.5 if passes > PATIENCE else 1.0
-    for unit in range(units + 1):
-        for i in range(last):
-            v_pu, gap = unit_v_pu[unit, i], history[2, unit, i]
-            moved = v_pu - history[0, unit, i] + gap - history[1, unit, i]
-            unit_v_pu[unit, i] = max(v_pu + step * gap - back * moved, 0.0)
-            history[0, unit, i] = v_pu
-            history[1, unit, i] = gap
-    return change / largest
-
-
-@compiled
-def positive(v: Vector) -> complex:
-    """Positive-sequence component of three phases."""
-    turn = complex(-0.5, 0.75**0.5)
-    return (v[0] + turn * v[1] + turn.conjugate() * v[2]) / 3.0
-
-
-@compiled
-def is_linear(tree: Tree, state: State, s: int) -> bool:
-    """Whether nothing in scenario ``s`` depends on the magnitude of a voltage."""
-    exponent, follows, machine_va = state.exponent, state.machine_exponent, state.machine_va
-    linear = bool(state.edge[s] < 0 or state.step_exponent[s] == 2.0)
-    for n in range(exponent.shape[0]):
-        linear &= exponent[n, s] == 2.0
-    for m in range(follows.shape[0]):
-        linear &= follows[m, s] == 2.0 or machine_va[m, s] == 0.0
-    return linear
 
 
 @compiled

@@ -77,8 +77,9 @@ def machines_of(feeder: Feeder, units: Sequence[object], motors: bool) -> Machin
         return 0j if z is None else 1.0 / z
 
     ders = feeder.ders
+    parts: list[Load | Der] = [*loads, *ders]
     return Machines(
-        unit=np.array([unit_of(part) for part in [*loads, *feeder.ders]], np.int64),
+        unit=np.array([unit_of(part) for part in parts], np.int64),
         motor_load=np.array(rows, np.int64),
         motor_share=np.array([load.motor_share for load in loads], np.float64),
         motor_y2_y1=np.array([load.motor_y2_y1 for load in loads], np.float64),

@@ -1,0 +1,217 @@
+"""Lines cut where something stands, and the tree that these pieces and the switches form."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .parts import Capacitor, Der, Feeder, Line, Load, Place, Regulator, Switch, Transformer
+from .symmetrical import phase_matrix
+
+__all__ = [
+    "NO_PHASES",
+    "Piece",
+    "check_fed",
+    "detached_end",
+    "node_name",
+    "pieces_of",
+    "place_of",
+    "span",
+]
+
+NO_PHASES: NDArray[np.complex128] = np.zeros((3, 3), np.complex128)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Piece:
+    """A stretch of line between two nodes, or a closed switch or regulator (``line`` None)."""
+
+    line: str | None
+    regulator: str | None = None
+    ends: tuple[str, str]  #: node names, in the direction of the line or regulator
+    start: float  #: fraction of the line at the first end
+    stop: float  #: and at the second
+    length_km: float
+    z_ohm: NDArray[np.complex128]  #: (3, 3)
+    end_y_s: NDArray[np.complex128]  #: (3, 3) half of the charging
+
+    @property
+    def key(self) -> tuple[str | None, tuple[str, str]]:
+        """What tells this piece from all others, in whichever state the network is."""
+        return self.line, self.ends
+
+
+def check_fed(feeder: Feeder, pieces: list[Piece], order: list[str]) -> None:
+    """Every bus hangs on the source, one way or another."""
+    apart = {end for piece in pieces for end in piece.ends} - set(order)
+    if apart:
+        names = ", ".join(repr(name) for name in sorted(apart))
+        raise InputError.single(
+            feeder.name,
+            "network",
+            names if len(names) < 60 else f"{len(apart)} buses apart",
+            f"must be connected with '{feeder.source.bus}' in every state of the switches",
+        )
+
+
+def detached_end(point: str) -> str:
+    """Name of the line end behind a measuring point's open recloser."""
+    return f"{point}:open"
+
+
+def _tee(line: str, fraction: float) -> str:
+    # no name may hold a colon, so no bus is called like a tee
+    return f"{line}:{fraction!r}"
+
+
+def node_name(feeder: Feeder, place: Place) -> str:
+    """The node of a place: its bus, or its tee; the ends of a line are buses."""
+    if place.bus is not None:
+        return place.bus
+    assert place.line is not None
+    assert place.at is not None
+    line = next(item for item in feeder.lines if item.name == place.line)
+    if place.at == 0.0:
+        return line.from_bus
+    if place.at == 1.0:
+        return line.to_bus
+    return _tee(place.line, place.at)
+
+
+def place_of(part: Transformer | Load | Der | Capacitor) -> Place:
+    """Where a part hangs that hangs on the feeder itself."""
+    assert part.place is not None
+    return part.place
+
+
+def _places(feeder: Feeder) -> list[Place]:
+    loose: list[Load | Der | Capacitor] = [*feeder.loads, *feeder.ders, *feeder.capacitors]
+    own = [part.place for part in loose if part.place is not None]
+    return [t.place for t in feeder.transformers] + own
+
+
+def pieces_of(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) -> list[Piece]:
+    """All stretches of line, then the closed switches, then the regulators."""
+    cuts: dict[str, set[float]] = defaultdict(set)
+    for place in _places(feeder):
+        if place.line is not None and place.at is not None:
+            cuts[place.line].add(place.at)
+    omega = 2.0 * np.pi * feeder.source.frequency_hz
+    pieces = []
+    for line in feeder.lines:
+        own = [p for p in feeder.points if p.line == line.name and p.name in opened]
+        detached = {point.bus: point.name for point in own}
+        pieces += _cut(line, cuts[line.name], detached, omega)
+    joining: list[Regulator | Switch] = [s for s in feeder.switches if s.name in closed]
+    for part in [*joining, *feeder.regulators]:
+        pieces.append(
+            Piece(
+                line=None,
+                regulator=part.name if isinstance(part, Regulator) else None,
+                ends=(part.from_bus, part.to_bus),
+                start=0.0,
+                stop=1.0,
+                length_km=0.0,
+                z_ohm=NO_PHASES,
+                end_y_s=NO_PHASES,
+            )
+        )
+    return pieces
+
+
+def _cut(line: Line, at: set[float], detached: dict[str, str], omega: float) -> list[Piece]:
+    """The line between its tees; ``detached``: ends that an open recloser keeps from the bus."""
+    fractions = sorted({0.0, 1.0, *at})
+    ends = [
+        detached_end(detached[bus]) if bus in detached else bus
+        for bus in (line.from_bus, line.to_bus)
+    ]
+    names = [ends[0], *(_tee(line.name, x) for x in fractions[1:-1]), ends[1]]
+    whole = line.length_km * phase_matrix(
+        line.z0_ohm_per_km, line.z1_ohm_per_km, line.z1_ohm_per_km
+    )
+    siemens = 0.5j * omega * line.length_km * 1e-9
+    half = siemens * phase_matrix(line.c0_nf_per_km, line.c1_nf_per_km, line.c1_nf_per_km)
+    return [
+        Piece(
+            line=line.name,
+            ends=(names[n], names[n + 1]),
+            start=fractions[n],
+            stop=fractions[n + 1],
+            length_km=line.length_km * (fractions[n + 1] - fractions[n]),
+            z_ohm=whole * (fractions[n + 1] - fractions[n]),
+            end_y_s=half * (fractions[n + 1] - fractions[n]),
+        )
+        for n in range(len(names) - 1)
+    ]
+
+
+def span(feeder: Feeder, pieces: list[Piece]) -> tuple[list[str], dict[str, int], Piece | None]:
+    """Node names in depth-first order, each node's piece to its parent, and the chord."""
+    order, parent_piece, left = _walk(feeder.source.bus, pieces, set())
+    if not left:
+        return order, parent_piece, None
+    if len(left) > 1:
+        raise InputError.single(
+            feeder.name, "switches", f"{len(left)} loops", "must close at most one loop"
+        )
+    # depth-first, so the one piece left over joins a node to its own ancestor: the fork.
+    # Either of the loop's two pieces at the fork may be the chord; it must have impedance.
+    back = pieces[left[0]]
+    fork = min(back.ends, key=order.index)
+    tail = max(back.ends, key=order.index)
+    chain = [tail]
+    while (up := _other(pieces[parent_piece[chain[-1]]], chain[-1])) != fork:
+        chain.append(up)
+    first = parent_piece[chain[-1]]
+    if np.abs(back.z_ohm).max() == 0.0:
+        if np.abs(pieces[first].z_ohm).max() == 0.0:
+            raise InputError.single(
+                feeder.name,
+                f"switches: the loop at bus '{fork}'",
+                "two switches or regulators",
+                "must leave the bus by a line on one side at least",
+            )
+        order, parent_piece, _ = _walk(feeder.source.bus, pieces, {first})
+        return order, parent_piece, pieces[first]
+    return order, parent_piece, back
+
+
+def _other(piece: Piece, end: str) -> str:
+    return piece.ends[0] if piece.ends[1] == end else piece.ends[1]
+
+
+def _walk(
+    root: str, pieces: list[Piece], without: set[int]
+) -> tuple[list[str], dict[str, int], list[int]]:
+    """Depth-first walk; returns order, parent pieces, and pieces to known nodes left over."""
+    touching: dict[str, list[int]] = defaultdict(list)
+    for n, piece in enumerate(pieces):
+        if n not in without:
+            for end in piece.ends:
+                touching[end].append(n)
+    order: list[str] = []
+    parent_piece: dict[str, int] = {}
+    used: set[int] = set()
+    left: list[int] = []
+    stack: list[tuple[str, int]] = [(root, -1)]
+    while stack:
+        name, came = stack.pop()
+        if came in used:
+            continue
+        if came >= 0:
+            used.add(came)
+        if name in parent_piece or (order and name == root):
+            left.append(came)
+            continue
+        order.append(name)
+        if came >= 0:
+            parent_piece[name] = came
+        for n in reversed(touching[name]):
+            if n not in used:
+                stack.append((_other(pieces[n], name), n))
+    return order, parent_piece, left
