@@ -48,8 +48,11 @@ def fed_through(network: Network, edge: Int, nodes: Int) -> NDArray[np.bool_]:
     An edge of a closed loop is no node's only supply.
     """
     tree = network.tree
-    found = np.zeros((nodes.size, edge.size), np.bool_)
-    for k in np.unique(edge[(edge > 0) & (edge < tree.parent.size)]):
-        if not tree.in_loop[k]:
-            found[:, edge == k] = network.below(int(k))[nodes][:, None]
-    return found
+    # nodes are in depth-first order: those below an edge follow its own without a gap
+    below = np.ones(tree.parent.size, np.int64)
+    for k in range(below.size - 1, 0, -1):
+        below[tree.parent[k]] += below[k]
+    own = np.where((edge > 0) & (edge < below.size), edge, 0)
+    only = (own > 0) & ~tree.in_loop[own]
+    after = nodes[:, None] - own
+    return np.asarray(only & (after >= 0) & (after < below[own]))
