@@ -103,7 +103,7 @@ def _length(flat: dict[str, NDArray[Any]], name: str) -> int:
 def block_array(path: Path, name: str) -> NDArray[Any] | None:
     """One array of a stored block; None where the file is damaged, or has no such array."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
             return np.asarray(file[name])
     except DAMAGED:
         return None

@@ -9,7 +9,7 @@ import pytest
 from openphase.model import load_feeder
 from openphase.model.network import compile_network
 from openphase.model.points import find_points
-from openphase.studies.run.certify import COMPARED
+from openphase.studies.run.classes import REPORTED
 from openphase.studies.run.spec import Device, Steps
 from openphase.studies.show.sheet import (
     setting_text,
@@ -21,31 +21,47 @@ from openphase.studies.show.sheet import (
 
 WEAK = "no false trip, but finds only 0.381 for sure, 0.5 wanted"
 HOLLOW = (
-    "few of the load steps outside, source steps and breaks elsewhere come near the thresholds: "
+    "few of the load steps upstream, source steps and 7 other classes come near the thresholds: "
     "their zero is weak evidence"
 )
 SPENT = (
-    "2 false trips of 57708 in load steps outside; worst scenario "
+    "2 false trips of 57708 in load steps upstream; worst scenario "
     "validate-2-load_step-00012:5; this sample is spent: run again with a new --seed"
 )
 FAR = "with the section cut, nothing behind this terminal feeds it"
 
 
+def classes(**trips: int) -> list[dict[str, Any]]:
+    """Every class on every side with 1000 trials; so many trips by the name of the class."""
+    rows: list[dict[str, Any]] = []
+    for own in REPORTED:
+        row = {
+            **{"name": own.name, "kind": own.kind, "side": own.side, "trials": 1000},
+            **{"trips": trips.get(own.name, 0), "upper": (1 + trips.get(own.name, 0)) / 1000},
+        }
+        rows.append(row | ({"alarms": 900} if own.name == "wiring" else {}))
+    return rows
+
+
 def section(status: str, reason: str, remote: str = "R2", **more: Any) -> dict[str, Any]:
     row = {
-        **{"local": "R1", "remote": remote, "status": status, "reason": reason},
+        **{"local": "R1", "remote": remote, "setting_group": "normal"},
+        **{"status": status, "reason": reason},
         **{"i_set_a": 0.15, "v_set_pu": 0.0025, "z_set_ohm": 100.25, "margin": 1.3},
         **{"opens": 60000, "unreachable": 2000, "detected": 29000},
         **{"false_trips": 0, "security_trials": 230832, "false_trip_upper": 0.0001},
+        "classes": classes(),
     }
     if status in ("none", "load_side"):
         row |= dict.fromkeys(("i_set_a", "v_set_pu", "z_set_ohm", "margin"))
+        row["classes"] = []
     return {**row, **more}
 
 
 def compared(name: str, **more: Any) -> dict[str, Any]:
     row = {
-        **{"local": "R1", "remote": "R2", "name": name, "reason": None},
+        **{"local": "R1", "remote": "R2", "setting_group": "normal"},
+        **{"name": name, "reason": None},
         **{"i_set_a": 0.15, "v_set_pu": 0.0025, "z_set_ohm": 100.25},
         **{"detected": 29000, "opens": 60000, "unreachable": 2000},
         **{"dependability_low": 0.49691, "dependability_high": 0.50309},
@@ -65,9 +81,9 @@ def answer(local: str = "R1", remote: str = "R2", feeder: str = "made up") -> di
     ]
     none = dict.fromkeys(("i_set_a", "v_set_pu", "z_set_ohm"))
     pairs = [
-        compared(COMPARED[0]),
-        compared(COMPARED[1], reason="the device has no V_set of 5 %", **none),
-        compared(COMPARED[2]),
+        compared("chosen"),
+        compared("best at reference V_set", reason="the device has no V_set of 5 %", **none),
+        compared("reference"),
     ]
     for row in [*sections, *pairs]:
         row["local"] = local
@@ -169,3 +185,76 @@ def test_a_row_s_terminal_is_named_as_the_terminal_itself() -> None:
     for terminal in find_points(feeder, compile_network(feeder)).terminals:
         row = {"local": terminal.local, "remote": terminal.remote}
         assert terminal_name(row) == terminal.name
+
+
+# --- classes, groups, assessments -------------------------------------------------------
+
+
+def test_classes_with_false_trips_are_listed_by_their_rate() -> None:
+    result = answer()
+    result["sections"][1]["classes"] = classes(source_step=7, earth_fault=2, open_three=500)
+    lines = sheet_table(result).splitlines()
+    at = lines.index("false trips by class")
+    said = " ".join(" ".join(lines[at + 1 : lines.index("", at)]).split())
+    assert said.startswith("R1→R3: 7 of 1000 source steps, 2 of 1000 earth faults inside, 2 of")
+    assert "three-phase" not in said
+
+
+def test_many_classes_are_cut_short_and_counted() -> None:
+    result = answer()
+    names = {own.name for own in REPORTED if own.kind == "must_not_trip"}
+    result["sections"][0]["classes"] = classes(**dict.fromkeys(names, 3))
+    count = sum(own.kind == "must_not_trip" for own in REPORTED)
+    assert f"and {count - 6} more classes" in " ".join(sheet_table(result).split())
+
+
+def test_the_worst_class_is_named() -> None:
+    result = answer()
+    result["sections"][1]["classes"] = classes(source_step=7)
+    said = " ".join(sheet_table(result).split())
+    count = sum(own.kind == "must_not_trip" for own in REPORTED)
+    assert f"the worst of {count} classes and sides that must not trip" in said
+    assert "Here the worst is source steps at R1→R3." in said
+
+
+def test_what_is_told_apart_is_summed_over_terminals() -> None:
+    result = answer()
+    for row in result["sections"][:2]:
+        row["classes"] = classes(open_three=999)
+    said = " ".join(sheet_table(result).split())
+    assert "told apart, share that trips: breaks on laterals inside 0 % of 4000" in said
+    assert "three-phase breaks inside 50 % of 4000" in said
+    assert "wiring faults: 90 % of 16000 raise the alarm." in said
+
+
+def two_groups() -> dict[str, Any]:
+    result = answer()
+    for key in ("sections", "compared"):
+        again = [row | {"setting_group": "tie closed"} for row in result[key]]
+        result[key] = result[key] + again
+    return result
+
+
+def test_every_group_has_its_table() -> None:
+    lines = sheet_table(two_groups()).splitlines()
+    heads = [n for n, line in enumerate(lines) if line.startswith("setting group ")]
+    assert [lines[n] for n in heads] == ["setting group normal", "setting group tie closed"]
+    assert all(lines[n + 1].startswith("terminal  status") for n in heads)
+    assert max(map(len, lines)) <= 100
+    # elsewhere a terminal is told from itself in the other group
+    assert any(line.startswith("  R1→R4 tie closed: no false trip") for line in lines)
+    assert sum(line.startswith("R1→R2 tie closed  chosen") for line in lines) == 1
+    assert "setting group" not in sheet_table(answer())
+
+
+def test_an_assessment_says_so_and_has_no_margin() -> None:
+    result = answer() | {"assessed": {"settings": "mine.csv", "note": "seen before"}}
+    lines = sheet_table(result).splitlines()
+    assert lines[0].startswith("made up: assessment of mine.csv, seed 1, attempt 2;")
+    assert "note: seen before" in lines
+    (head,) = [line for line in lines if line.startswith("terminal")]
+    assert "margin" not in head
+    assert head.split()[-4:] == ["found", "false", "trips", "bound"]
+    # nothing beside what is assessed: no comparison
+    result["compared"] = [compared("assessed")]
+    assert "compared" not in sheet_table(result)

@@ -15,23 +15,25 @@ from typing import Any
 import pytest
 
 from openphase.model import load_feeder
+from openphase.model.distributions import Uniform
 from openphase.model.errors import OpenPhaseError
 from openphase.model.feeder_file import dump_feeder
 from openphase.studies import cli, sizing
+from openphase.studies.run import session
+from openphase.studies.run.digests import population_digest
 from openphase.studies.run.ledger import find_attempt, reserve
-from openphase.studies.run.spec import NetworkState, default_study, dump_study
-from openphase.studies.sizing import population_digest
+from openphase.studies.run.spec import Group, NetworkState, default_study, dump_study
 
 NOT_COMPARED = {"log.txt", "timing.json"}
 
 RESULT_KEYS = """version seed feeder study_hash confidence attempt scenarios sections compared
     feeder_false_trips numerics"""
 SECTION_KEYS = """local remote setting_group status reason i_set_a i_set_pu v_set_pu z_set_ohm
-    dt_ms delay_ms trigger negative_sign line_z1_ohm margin opens unreachable detected dependability
-    dependability_low dependability_high security_trials false_trips false_trip_upper
+    dt_ms delay_ms trigger negative_sign options line_z1_ohm margin opens unreachable detected
+    dependability dependability_low dependability_high security_trials false_trips false_trip_upper
     false_trips_per_year_upper classes causes nearest_false_trip fixes"""
-COMPARED_KEYS = """local remote name i_set_a v_set_pu z_set_ohm detected opens unreachable
-    dependability_low dependability_high false_trips trials upper reason"""
+COMPARED_KEYS = """local remote setting_group name i_set_a v_set_pu z_set_ohm detected opens
+    unreachable dependability_low dependability_high false_trips trials upper reason"""
 CLASS_KEYS = "name kind side trials effective_trials trips upper"
 
 
@@ -107,9 +109,10 @@ def test_the_keys_are_the_contract_s(first: Said) -> None:
     for row in result["sections"]:
         assert list(row) == SECTION_KEYS.split()
         for own in row["classes"]:
-            assert list(own) == CLASS_KEYS.split()
+            more = ["alarms"] if own["name"] == "wiring" else []
+            assert list(own) == CLASS_KEYS.split() + more
             assert own["kind"] in ("must_trip", "must_not_trip", "apart")
-            assert own["side"] in ("inside", "outside")
+            assert own["side"] in ("inside", "upstream", "downstream", "other", "network")
         for cause in row["causes"]:
             assert list(cause) == ["criterion", "share"]
         if row["nearest_false_trip"]:
@@ -215,12 +218,23 @@ def lenient(folder: Path) -> Path:
     ],
 )
 def test_exit_code(statuses: tuple[str, ...], code: int) -> None:
+    assert session.exit_code({"sections": rows_of("normal", *statuses)}) == code
+
+
+def rows_of(group: str, *statuses: str) -> list[dict[str, str]]:
     ends = [("A", "B"), ("B", "A"), ("B", "C"), ("C", "B")]
-    rows = [
-        {"local": a, "remote": b, "status": status}
+    return [
+        {"local": a, "remote": b, "setting_group": group, "status": status}
         for (a, b), status in zip(ends, statuses, strict=True)
     ]
-    assert sizing.exit_code({"sections": rows}) == code
+
+
+def test_a_section_needs_a_usable_terminal_in_every_group() -> None:
+    normal = rows_of("normal", "set", "load_side", "weak", "load_side")
+    tied = rows_of("tied", "set", "set", "set", "set")
+    assert session.exit_code({"sections": normal + tied}) == 0
+    tied = rows_of("tied", "set", "set", "none", "none")
+    assert session.exit_code({"sections": normal + tied}) == 3
 
 
 # --- the same bytes --------------------------------------------------------------------
@@ -437,7 +451,7 @@ def test_the_current_folder_may_be_the_run_folder(
 
 @pytest.mark.usefixtures("plain")
 def test_a_long_run_is_refused_without_yes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sizing, "LONG_RUN_S", 0)
+    monkeypatch.setattr(session, "LONG_RUN_S", 0)
     said = size(tmp_path / "run")
     assert said.code == 1
     assert "--yes" in said.err
@@ -450,7 +464,7 @@ def test_a_run_that_is_refused_for_its_length_has_changed_nothing(
 ) -> None:
     """The earlier results are there still, and no draw was looked at: no attempt is spent."""
     before, kept = files(copy), ledger(copy)
-    monkeypatch.setattr(sizing, "LONG_RUN_S", 0)
+    monkeypatch.setattr(session, "LONG_RUN_S", 0)
     assert size(copy, seed=2).code == 1
     assert files(copy) == before
     assert ledger(copy) == kept
@@ -490,7 +504,24 @@ def test_one_population_however_it_is_written() -> None:
     assert population_digest(replace(feeder, name="other"), unnamed) == own
     margin = replace(study, certificate=replace(study.certificate, margin=2.0))
     assert population_digest(feeder, margin) == own
-    loads = replace(study, loads=replace(study.loads, level=(0.5, 1.0)))
+    loads = replace(study, loads=replace(study.loads, level=Uniform(low=0.5, high=1.0)))
     assert population_digest(feeder, loads) != own
     tied = replace(study, network=NetworkState(closed=("R4",)))
     assert population_digest(feeder, tied) != own
+
+
+def test_every_group_is_part_of_the_population() -> None:
+    feeder, study = load_feeder("paper"), default_study("paper")
+
+    def grouped(*groups: Group, settings: str = "each") -> str:
+        network = replace(study.network, settings=settings)
+        return population_digest(feeder, replace(study, groups=groups, network=network))
+
+    normal = Group(name="normal", closed=())
+    tied = Group(name="tied", closed=("R4",))
+    both = grouped(normal, tied)
+    assert len({grouped(normal), both, grouped(tied, normal)}) == 3
+    backwards = Group(name="tied", closed=("R4",), opened=("R1",))
+    assert grouped(normal, backwards) != both
+    # whether the groups share their settings is a demand, and draws nothing else
+    assert grouped(normal, tied, settings="one") == both
