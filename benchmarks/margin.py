@@ -21,9 +21,9 @@ from openphase.studies.run.classes import REPORTED, Purpose
 from openphase.studies.run.draw import make_case
 from openphase.studies.run.engine import BLOCK
 from openphase.studies.run.ledger import Attempt
-from openphase.studies.run.spec import default_study
 from openphase.studies.run.store import RunFolder
 from openphase.studies.run.tally import Tested, Trained, judge_block, train_block
+from openphase.studies.spec.study_file import default_study
 
 MARGINS = (1.0, 1.05, 1.1, 1.25, 1.5)
 SEEDS = range(101, 109)

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openphase.model import load_feeder
-from openphase.model.bank import D_YG, YG_D
 from openphase.model.network import Network
 from openphase.model.points import point_probes
 from openphase.model.solve import all_probes, solve
+from openphase.model.solver.bank import D_YG, YG_D
 from openphase.model.states import Probes, State
 from openphase.studies.run.classes import DrawClass, Purpose
 from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case
-from openphase.studies.run.spec import Study, default_study
+from openphase.studies.spec.study_file import Study, default_study
 
 __all__ = [
     "Complex",

@@ -8,13 +8,6 @@ from __future__ import annotations
 
 from .errors import InputError, OpenPhaseError
 from .feeder import make_feeder
-from .feeder_file import (
-    dump_feeder,
-    feeder_from_toml,
-    load_feeder,
-    read_feeder,
-    shipped_feeders,
-)
 from .parts import (
     Capacitor,
     Der,
@@ -28,6 +21,13 @@ from .parts import (
     Source,
     Switch,
     Transformer,
+)
+from .reading.feeder_file import (
+    dump_feeder,
+    feeder_from_toml,
+    load_feeder,
+    read_feeder,
+    shipped_feeders,
 )
 
 __all__ = [

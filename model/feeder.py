@@ -11,11 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .errors import Report
-from .feeder_document import document_from_feeder, feeder_from_document
-from .feeder_electrical import check_electrical
-from .feeder_graph import check_graph, check_section_paths, graph_is_known
-from .feeder_names import STUB_SUFFIXES, check_ends, check_names, check_references
-from .feeder_tables import with_csv_tables
 from .parts import (
     Capacitor,
     Der,
@@ -29,6 +24,11 @@ from .parts import (
     Switch,
     Transformer,
 )
+from .reading.feeder_document import document_from_feeder, feeder_from_document
+from .reading.feeder_electrical import check_electrical
+from .reading.feeder_graph import check_graph, check_section_paths, graph_is_known
+from .reading.feeder_names import STUB_SUFFIXES, check_ends, check_names, check_references
+from .reading.feeder_tables import with_csv_tables
 from .topology import buses
 
 __all__ = ["STUB_SUFFIXES", "buses", "checked_feeder", "make_feeder"]

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .ladder import solve_block
 from .machines import FLOOR_PU, machine_state
 from .network import Network
+from .solver.ladder import solve_block
 from .states import Answer, Probes, State, workspace
 
 __all__ = ["FLOOR_PU", "all_probes", "new_answer", "quiet_state", "solve", "steady_state"]

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bank import D_D, D_YG, Y_D, YG_D, YG_YG
 from .machines import Machines, power_va
 from .parts import Der, Feeder, Load, Source, Transformer
 from .pieces import Piece, node_name
+from .solver.bank import D_D, D_YG, Y_D, YG_D, YG_YG
 from .symmetrical import phase_matrix
 
 __all__ = [

@@ -47,12 +47,12 @@ from .run.session import (
     read_own_study,
     validate,
 )
-from .run.spec import Study, dump_study
 from .run.status import loop_note
 from .run.store import RunFolder, as_json
 from .settings_file import SettingsSheet, read_sheet
 from .show.report import write_report
 from .show.sheet import settings_csv, sheet_table
+from .spec.study_file import Study, dump_study
 
 __all__ = ["REFERENCE", "Assessment", "assess_command", "assess_feeder"]
 

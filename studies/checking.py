@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from ..model.errors import InputError, OpenPhaseError
-from ..model.feeder_file import load_feeder
 from ..model.network import Network, assumed_connection, compile_network
 from ..model.parts import Der, Feeder, Load, Place, Regulator, Switch
 from ..model.points import Terminal, find_points
-from ..model.provenance import assumptions, count_origins
-from .run.spec import Study, check_study, default_study
+from ..model.reading.feeder_file import load_feeder
+from ..model.reading.provenance import assumptions, count_origins
 from .run.store import as_json
 from .show.sheet import PAGE, wrapped
+from .spec.study_file import Study, check_study, default_study
 
 __all__ = ["check_command", "summary"]
 

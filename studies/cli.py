@@ -294,6 +294,6 @@ def _compare(args: argparse.Namespace) -> int:
 
 
 def _paper(args: argparse.Namespace) -> int:
-    from .paper import paper_command
+    from .paper.command import paper_command
 
     return paper_command(args)

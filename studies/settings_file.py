@@ -10,8 +10,8 @@ from pathlib import Path
 
 from ..detector.criteria import Options, Settings
 from ..model.errors import Fault, InputError
-from ..model.fields import did_you_mean
 from ..model.parts import Feeder
+from ..model.reading.fields import did_you_mean
 from .run.options import parse_options
 
 __all__ = ["SettingsSheet", "read_settings", "read_sheet"]

@@ -41,12 +41,12 @@ from .run.session import (
     run_until_enough,
     validate,
 )
-from .run.spec import Study, dump_study
 from .run.status import nearest_false_trip, refusal_text
 from .run.store import RunFolder, as_json, npz, pack
 from .run.tally import Trained, train_block
 from .show.report import write_report
 from .show.sheet import settings_csv, sheet_table
+from .spec.study_file import Study, dump_study
 
 __all__ = ["Sizing", "size_command", "size_feeder"]
 

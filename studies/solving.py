@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from ..detector.criteria import Options, Reason, Settings, reach_of, verdict
 from ..detector.evidence import Evidence, Phasors, evidence_of, only
-from ..model.breaks import FLOATING, UNDEFINED
 from ..model.errors import Fault, InputError, OpenPhaseError, Report
-from ..model.feeder_file import load_feeder
-from ..model.fields import did_you_mean
 from ..model.network import Network, compile_network, locate
 from ..model.parts import Feeder
 from ..model.points import Points, find_points, into_line
+from ..model.reading.feeder_file import load_feeder
+from ..model.reading.fields import did_you_mean
 from ..model.solve import solve, steady_state
+from ..model.solver.breaks import FLOATING, UNDEFINED
 from ..model.states import NOT_CONVERGED, Answer
 from .run.store import as_json
 from .settings_file import read_settings

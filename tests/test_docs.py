@@ -9,7 +9,7 @@ import pytest
 
 from openphase.model import read_feeder
 from openphase.studies.cli import main
-from openphase.studies.run.spec import check_study, read_study
+from openphase.studies.spec.study_file import check_study, read_study
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -14,11 +14,11 @@ from ...model.network import CONNECTIONS, Network, compile_network
 from ...model.parts import Feeder
 from ...model.points import Points, Terminal, find_points
 from ...optimise.counts import Grid
+from ..spec.events import CLASSES, SwitchState
+from ..spec.parts import UNKNOWN_CONNECTION
+from ..spec.parts import Group as GroupSpec
+from ..spec.study_file import Study
 from .classes import DrawClass
-from .spec import Study
-from .spec_events import CLASSES, SwitchState
-from .spec_parts import UNKNOWN_CONNECTION
-from .spec_parts import Group as GroupSpec
 
 __all__ = ["Case", "Group", "Wired", "make_case", "make_cases"]
 

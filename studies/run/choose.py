@@ -14,13 +14,13 @@ from ...detector.criteria import Settings
 from ...optimise.counts import Corners, Grid, merge
 from ...optimise.staircase import Front, merge_fronts
 from ...optimise.thresholds import Choice, Refusal, Sample, choose, pool
+from ..spec.study_file import Study
 from .cases import Case
 from .classes import REPORTED, DrawClass, Purpose
 from .draw import BlockId
 from .draw_event import draw_event, event_sides
 from .engine import BLOCK, options_of
 from .ledger import Attempt
-from .spec import Study
 from .status import common_window
 from .tally import Trained
 

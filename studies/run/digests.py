@@ -8,11 +8,11 @@ from dataclasses import replace
 from importlib import metadata, resources
 
 from ... import __version__
-from ...model.feeder_file import feeder_content
 from ...model.parts import Feeder
+from ...model.reading.feeder_file import feeder_content
+from ..spec.study_file import Study, dump_population, dump_study, resolved
 from .engine import BLOCK
 from .ledger import Attempt
-from .spec import Study, dump_population, dump_study, resolved
 
 __all__ = ["code_digest", "digest", "manifest", "population_digest"]
 

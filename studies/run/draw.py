@@ -16,10 +16,10 @@ from ...model.machines import DER_MODELS, machine_state
 from ...model.network import CONNECTIONS
 from ...model.solve import quiet_state
 from ...model.states import State
+from ..spec.correlations import draw_scalars
 from .cases import Case, Group, Wired, make_case, make_cases
 from .classes import DrawClass, Purpose
 from .draw_event import draw_event, draw_wiring
-from .spec_correlations import draw_scalars
 
 __all__ = [
     "BlockId",

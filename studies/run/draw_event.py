@@ -26,9 +26,9 @@ from ...model.events.regulator_tap import draw_regulator_tap
 from ...model.events.single_pole import draw_single_pole
 from ...model.events.source_step import draw_source_step
 from ...model.events.step_with_tap import draw_step_with_tap
+from ..spec.events import WIRING_KINDS
 from .cases import Case
 from .classes import DrawClass, sides
-from .spec_events import WIRING_KINDS
 
 __all__ = ["draw_event", "draw_wiring", "event_sides"]
 

@@ -16,10 +16,10 @@ from ...model.network import Network
 from ...model.points import into_line, point_probes
 from ...model.solve import solve, steady_state
 from ...model.states import Answer, State
+from ..spec.study_file import Study
 from .cases import Case, Wired
 from .draw import Scenarios
 from .draw_event import event_sides
-from .spec import Study
 
 __all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "bounds_of", "observe", "options_of"]
 

@@ -13,11 +13,12 @@ from typing import Any
 
 from ...detector.criteria import Settings
 from ...model.errors import InputError, OpenPhaseError
-from ...model.feeder_file import load_feeder
 from ...model.parts import Feeder
-from ...model.toml_file import read_text
-from ...model.toml_lines import locator
+from ...model.reading.feeder_file import load_feeder
+from ...model.reading.toml_file import read_text
+from ...model.reading.toml_lines import locator
 from ...optimise.certificate import needed_trials, share_of_alpha
+from ..spec.study_file import Study, check_study, default_study, read_study
 from .blocks import run_blocks
 from .cases import Case
 from .certify import Validation, add_up, judged_pairs
@@ -26,7 +27,6 @@ from .classes import Purpose
 from .draw import BlockId
 from .engine import BLOCK
 from .ledger import Attempt
-from .spec import Study, check_study, default_study, read_study
 from .store import RunFolder
 from .tally import Tested, judge_block, train_block
 

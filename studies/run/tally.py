@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...detector.criteria import Options, Reason, Settings, reach_of, verdict
 from ...detector.evidence import only
-from ...model.breaks import DEAD, FLOATING
+from ...model.solver.breaks import DEAD, FLOATING
 from ...model.states import NOT_CONVERGED
 from ...optimise.counts import Corners, corners_of
 from ...optimise.staircase import Front, front_of

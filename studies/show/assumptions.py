@@ -5,10 +5,10 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from ...model.fields import as_toml
-from ..run.spec import Study
-from ..run.spec_fields import TABLES, part_of
-from ..run.spec_values import as_table
+from ...model.reading.fields import as_toml
+from ..spec.fields import TABLES, part_of
+from ..spec.study_file import Study
+from ..spec.values import as_table
 from .html_parts import bullets, table
 
 __all__ = ["assumptions"]

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from ..paper_courses import Panel, Trace
+from ..paper.courses import Panel, Trace
 from .figures import (
     BLUE,
     GREEN,

@@ -12,8 +12,8 @@ from ...optimise.staircase import Front
 from ..run.cases import Case
 from ..run.certify import Validation
 from ..run.classes import DrawClass
-from ..run.spec import Study
 from ..run.store import RunFolder
+from ..spec.study_file import Study
 from .assumptions import assumptions
 from .html_parts import (
     bound_text,

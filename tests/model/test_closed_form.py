@@ -11,7 +11,6 @@ from oracles.random_feeders import random_feeder
 from oracles.scenes import Scene, looks, opened, scene
 
 from openphase.model import Feeder, Place, load_feeder
-from openphase.model.breaks import DEAD, FLOATING
 from openphase.model.closed_form import (
     break_current,
     break_voltage,
@@ -23,6 +22,7 @@ from openphase.model.closed_form import (
     z_op_a_yg_d_approx,
 )
 from openphase.model.sequence_network import Flow, after, before, loops, sequence_network, two_port
+from openphase.model.solver.breaks import DEAD, FLOATING
 from openphase.model.states import Answer
 from openphase.model.symmetrical import to_phases, to_sequences
 

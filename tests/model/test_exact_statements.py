@@ -27,7 +27,6 @@ from oracles.scenes import (
 
 from openphase.detector.impedance import connection_impedance
 from openphase.model import Feeder, Place, load_feeder
-from openphase.model.breaks import FLOATING
 from openphase.model.closed_form import (
     break_current,
     z_op1,
@@ -38,6 +37,7 @@ from openphase.model.network import compile_network, locate
 from openphase.model.parts import Connection
 from openphase.model.points import Terminal
 from openphase.model.sequence_network import loops, sequence_network
+from openphase.model.solver.breaks import FLOATING
 from openphase.model.states import NOT_CONVERGED, State
 from openphase.model.symmetrical import to_sequences
 

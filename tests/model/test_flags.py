@@ -22,9 +22,9 @@ from openphase.model import (
     Transformer,
     make_feeder,
 )
-from openphase.model.breaks import DEAD, FLOATING, UNDEFINED
 from openphase.model.parts import Connection, LoadConnection
 from openphase.model.points import into_line
+from openphase.model.solver.breaks import DEAD, FLOATING, UNDEFINED
 from openphase.model.states import Answer
 
 ONE, TWO, ALL = (0b001, 0b010, 0b100), (0b011, 0b101, 0b110), 0b111

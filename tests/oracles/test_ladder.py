@@ -14,13 +14,13 @@ from oracles.dense import Event as DenseEvent
 from oracles.random_elements import random_full_feeder
 from oracles.random_happenings import Happening, dense_event, random_happening
 
-from openphase.model.breaks import DEAD, FLOATING
 from openphase.model.errors import InputError
 from openphase.model.events.base import apply_event
 from openphase.model.machines import DER_MODELS, carried_over
 from openphase.model.network import Network, compile_network, detached_end
 from openphase.model.parts import Feeder
 from openphase.model.solve import solve, steady_state
+from openphase.model.solver.breaks import DEAD, FLOATING
 from openphase.model.states import NOT_CONVERGED, Answer
 
 TOLERANCE = 1e-9

@@ -29,7 +29,6 @@ from openphase.studies.run.certify import (
 )
 from openphase.studies.run.classes import REPORTED, DrawClass, Purpose
 from openphase.studies.run.draw import BlockId
-from openphase.studies.run.spec import Group, default_study
 from openphase.studies.run.status import (
     loop_note,
     nearest_false_trip,
@@ -37,6 +36,7 @@ from openphase.studies.run.status import (
     scenario_name,
     window_of,
 )
+from openphase.studies.spec.study_file import Group, default_study
 
 HEAD, HEAD_AWAY = 0, 1  # R1→R2, R2→R1
 TERMINALS, CLASSES = 8, len(REPORTED)

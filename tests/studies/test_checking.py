@@ -11,8 +11,8 @@ import pytest
 from openphase.model import dump_feeder, feeder_from_toml, load_feeder, read_feeder
 from openphase.studies.checking import _text, summary
 from openphase.studies.cli import main
-from openphase.studies.run.spec import default_study
 from openphase.studies.show.feeder_layout import lay_out
+from openphase.studies.spec.study_file import default_study
 
 
 def test_summary_of_the_paper_s_feeder(capsys: pytest.CaptureFixture[str]) -> None:

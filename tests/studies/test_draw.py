@@ -19,7 +19,7 @@ from openphase.model import load_feeder
 from openphase.model.network import CONNECTIONS
 from openphase.studies.run.classes import DrawClass, Purpose
 from openphase.studies.run.draw import BlockId, Case, Scenarios, draw_scenarios, make_case, stream
-from openphase.studies.run.spec import LoadDraw, TransformerDraw, default_study
+from openphase.studies.spec.study_file import LoadDraw, TransformerDraw, default_study
 
 N = 6000
 FIRST = BlockId(

@@ -16,9 +16,9 @@ from openphase.studies.run.choose import gather
 from openphase.studies.run.classes import REPORTED, DrawClass, Purpose, Side
 from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case
 from openphase.studies.run.engine import Observed, observe
-from openphase.studies.run.spec import Study, default_study
 from openphase.studies.run.store import pack
 from openphase.studies.run.tally import Trained, judge_block, train_block
+from openphase.studies.spec.study_file import Study, default_study
 
 SIZE = 300
 MARGIN = 1.25

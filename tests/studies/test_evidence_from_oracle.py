@@ -18,7 +18,7 @@ from openphase.model.states import State
 from openphase.studies.run.classes import DrawClass, Purpose, Side
 from openphase.studies.run.draw import BlockId, Case, Scenarios, draw_scenarios, make_case
 from openphase.studies.run.engine import observe
-from openphase.studies.run.spec import NetworkState, default_study
+from openphase.studies.spec.study_file import NetworkState, default_study
 
 SIZE = 12
 NAMES = {code: name for name, code in CONNECTIONS.items()}

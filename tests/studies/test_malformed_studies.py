@@ -17,12 +17,12 @@ import pytest
 
 from openphase import model
 from openphase.model import Feeder, InputError, load_feeder
-from openphase.model.toml_file import read_text
-from openphase.model.toml_lines import locator
+from openphase.model.reading.toml_file import read_text
+from openphase.model.reading.toml_lines import locator
 from openphase.studies.cli import main
-from openphase.studies.run.spec import check_study, dump_study, read_study, study_from_toml
-from openphase.studies.run.spec_correlations import draw_scalars
-from openphase.studies.run.spec_fields import CORRELATIONS, DOCUMENT, EVENTS, GROUPS, TABLES
+from openphase.studies.spec.correlations import draw_scalars
+from openphase.studies.spec.fields import CORRELATIONS, DOCUMENT, EVENTS, GROUPS, TABLES
+from openphase.studies.spec.study_file import check_study, dump_study, read_study, study_from_toml
 
 CASES = sorted((Path(__file__).parents[1] / "malformed" / "study").iterdir())
 PAPER = (resources.files(model) / "data" / "paper.study.toml").read_text(encoding="utf-8")

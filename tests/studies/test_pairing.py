@@ -23,9 +23,9 @@ from openphase.studies.run.draw import BlockId, draw_scenarios
 from openphase.studies.run.engine import observe
 from openphase.studies.run.pairing import BLOCK_NAME
 from openphase.studies.run.session import Demand
-from openphase.studies.run.spec import Group, Study, default_study
 from openphase.studies.run.verdicts import REASONS, SIDES, pack_verdicts, unpack_verdicts
 from openphase.studies.settings_file import read_sheet
+from openphase.studies.spec.study_file import Group, Study, default_study
 
 N = 60
 

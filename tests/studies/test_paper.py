@@ -13,10 +13,10 @@ import pytest
 
 from openphase.model import load_feeder
 from openphase.studies.cli import main
-from openphase.studies.paper import paper_groups, paper_result, paper_table
-from openphase.studies.paper_cases import ideal_banks, open_phase_a, unit_at
-from openphase.studies.paper_courses import WINDOW_S, paper_panels
-from openphase.studies.paper_printed import PRINTED, Group, Row
+from openphase.studies.paper.cases import ideal_banks, open_phase_a, unit_at
+from openphase.studies.paper.command import paper_groups, paper_result, paper_table
+from openphase.studies.paper.courses import WINDOW_S, paper_panels
+from openphase.studies.paper.printed import PRINTED, Group, Row
 from openphase.studies.show.figures import save_png
 from openphase.studies.show.paper_figures import paper_pictures, plot_panel
 

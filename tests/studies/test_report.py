@@ -9,14 +9,14 @@ import sys
 import numpy as np
 import pytest
 
-from openphase.model.feeder_file import feeder_from_toml, load_feeder
+from openphase.model.reading.feeder_file import feeder_from_toml, load_feeder
 from openphase.optimise.staircase import border, front_of
-from openphase.studies.run.spec import default_study
 from openphase.studies.run.store import RunFolder
 from openphase.studies.show import figures, plots, views
 from openphase.studies.show.feeder_layout import lay_out
 from openphase.studies.show.report import STATUS, report_html, write_report
 from openphase.studies.sizing import Demand, size_feeder
+from openphase.studies.spec.study_file import default_study
 
 FORKED = """
 format = 1

@@ -10,7 +10,6 @@ from openphase.model import load_feeder
 from openphase.model.network import compile_network
 from openphase.model.points import find_points
 from openphase.studies.run.classes import REPORTED
-from openphase.studies.run.spec import Device, Steps
 from openphase.studies.show.sheet import (
     setting_text,
     sheet_table,
@@ -18,6 +17,7 @@ from openphase.studies.show.sheet import (
     terminal_name,
     wrapped,
 )
+from openphase.studies.spec.study_file import Device, Steps
 
 WEAK = "no false trip, but finds only 0.381 for sure, 0.5 wanted"
 HOLLOW = (

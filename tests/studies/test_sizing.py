@@ -17,12 +17,12 @@ import pytest
 from openphase.model import load_feeder
 from openphase.model.distributions import Uniform
 from openphase.model.errors import OpenPhaseError
-from openphase.model.feeder_file import dump_feeder
+from openphase.model.reading.feeder_file import dump_feeder
 from openphase.studies import cli, sizing
 from openphase.studies.run import session
 from openphase.studies.run.digests import population_digest
 from openphase.studies.run.ledger import find_attempt, reserve
-from openphase.studies.run.spec import Group, NetworkState, default_study, dump_study
+from openphase.studies.spec.study_file import Group, NetworkState, default_study, dump_study
 
 NOT_COMPARED = {"log.txt", "timing.json"}
 

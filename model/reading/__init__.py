@@ -1,0 +1,1 @@
+"""Reading and writing feeder files: fields, checks, messages."""

@@ -1,0 +1,1 @@
+"""The compiled solver; ``model.solve`` is its door."""
