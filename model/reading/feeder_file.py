@@ -22,7 +22,7 @@ __all__ = [
     "shipped_feeders",
 ]
 
-_DATA = resources.files(__name__.rpartition(".")[0]) / "data"
+_DATA = resources.files(__name__.removesuffix(".reading.feeder_file")) / "data"
 
 
 def read_feeder(path: Path) -> Feeder:

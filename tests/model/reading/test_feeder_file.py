@@ -30,7 +30,7 @@ from openphase.model import (
 from openphase.model.reading.feeder_fields import DOCUMENT, TABLES
 from openphase.model.reading.fields import markdown_table
 
-DOC = Path(__file__).parents[2] / "docs" / "feeder-file.md"
+DOC = Path(__file__).parents[3] / "docs" / "feeder-file.md"
 
 GOOD = """\
 format = 1

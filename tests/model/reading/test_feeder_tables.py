@@ -17,7 +17,7 @@ from openphase.model.reading.csv_table import columns_of, parse_csv
 from openphase.model.reading.feeder_fields import CSV_TABLES, ROWS
 from openphase.model.reading.toml_file import toml_rows
 
-DOC = Path(__file__).parents[2] / "docs" / "feeder-file.md"
+DOC = Path(__file__).parents[3] / "docs" / "feeder-file.md"
 
 FEEDER = """\
 format = 1

@@ -44,7 +44,7 @@ from openphase.studies.spec.study_file import (
     study_from_toml,
 )
 
-DOC = Path(__file__).parents[2] / "docs" / "study-file.md"
+DOC = Path(__file__).parents[3] / "docs" / "study-file.md"
 
 
 def study(*lines: str) -> Study:
