@@ -56,4 +56,4 @@ def _ratio_factor(network: Network, moves: NDArray[np.float64]) -> NDArray[np.fl
     tap = np.rint((np.where(upward, old, 1.0 / old) - 1.0) / step)
     beyond = (np.abs(tap + moves) > most).any(axis=(0, 1))
     boost = 1.0 + np.clip(tap + np.where(beyond, -moves, moves), -most, most) * step
-    return np.where(upward, boost, 1.0 / boost) / old
+    return np.asarray(np.where(upward, boost, 1.0 / boost) / old)
