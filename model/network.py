@@ -57,6 +57,7 @@ class Network:
     regulators: tuple[str, ...]
     ratio: NDArray[np.float64]  #: (R, 3) lower over upper voltage, as in the file
     ratio_step: NDArray[np.float64]  #: (R,) what one tap adds to the voltage, lower over upper
+    ratio_most: NDArray[np.int64]  #: (R,) taps to either side of neutral
     ratio_upward: NDArray[np.bool_]  #: (R,) the regulator's from-end is the upper one
     equipped: NDArray[np.bool_]  #: (edges,) something is connected below the edge
     emf_pu: float

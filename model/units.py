@@ -124,5 +124,6 @@ def regulator_arrays(
         "regulators": tuple(regulator.name for regulator in feeder.regulators),
         "ratio": np.array(ratio, np.float64).reshape(-1, 3),
         "ratio_step": np.array(step, np.float64),
+        "ratio_most": np.array([r.most_taps for r in feeder.regulators], np.int64),
         "ratio_upward": np.array(ways, np.bool_),
     }

@@ -46,8 +46,14 @@ def draw_regulator_tap(
 
 
 def _ratio_factor(network: Network, moves: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(R, 3, S) new over old ratio, ``moves`` taps on; a tap adds to the to-end's voltage."""
+    """(R, 3, S) new over old ratio, ``moves`` taps on; a tap adds to the to-end's voltage.
+
+    Where a phase would pass its end stop, the move is the other way, as far as it goes.
+    """
     upward, step = network.ratio_upward[:, None, None], network.ratio_step[:, None, None]
+    most = network.ratio_most[:, None, None]
     old = network.ratio[:, :, None]
-    boost = np.where(upward, old, 1.0 / old) + moves * step
-    return np.where(upward, boost, 1.0 / boost) / old
+    tap = np.rint((np.where(upward, old, 1.0 / old) - 1.0) / step)
+    beyond = (np.abs(tap + moves) > most).any(axis=(0, 1))
+    boost = 1.0 + np.clip(tap + np.where(beyond, -moves, moves), -most, most) * step
+    return np.asarray(np.where(upward, boost, 1.0 / boost) / old)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from oracles.event_draws import draw
-from oracles.event_sites import Site
+from oracles.event_sites import Site, site_of
 from scipy.stats import kstest
 
 from openphase.model.distributions import Fixed
@@ -56,6 +57,35 @@ def test_a_regulator_ends_on_a_whole_tap_of_its_own(site: Site) -> None:
     for move in (-2, -1, 1, 2):
         share = (np.rint(moves) == move).any(axis=(0, 1)).mean()
         assert abs(share - 0.25) < 5.0 * math.sqrt(0.25 * 0.75 / N)
+
+
+@pytest.mark.parametrize(
+    ("taps", "move", "share", "wanted"),
+    [
+        ((16, 15, -16), 2.0, 1.0, {(-2, 0, 0), (0, -2, 0), (0, 0, 2)}),
+        ((16, 15, -16), -2.0, 1.0, {(-2, 0, 0), (0, -2, 0), (0, 0, 2)}),
+        ((16, 14, 15), 1.0, 0.0, {(-1, -1, -1)}),
+        ((15, 14, 15), 1.0, 0.0, {(1, 1, 1)}),
+        ((-16, -16, -16), -2.0, 0.0, {(2, 2, 2)}),
+    ],
+)
+def test_at_an_end_stop_a_move_goes_the_other_way(
+    site: Site,
+    rng: np.random.Generator,
+    taps: tuple[int, int, int],
+    move: float,
+    share: float,
+    wanted: set[tuple[int, int, int]],
+) -> None:
+    first, second = site.feeder.regulators
+    first = replace(first, taps=taps)
+    own = site_of(replace(site.feeder, regulators=(first, second)))
+    event = draw_regulator_tap(rng, 60, own.network, Fixed(value=move), share)
+    here = (event.tap_factor[0] != 1.0).any(axis=0)
+    boost = own.network.ratio[0, :, None] * event.tap_factor[0]
+    moves = (boost - 1.0) * 100.0 / first.step_pct - np.array(taps)[:, None]
+    np.testing.assert_allclose(moves, np.rint(moves), atol=1e-9)
+    assert {tuple(column) for column in np.rint(moves[:, here]).T.astype(int).tolist()} == wanted
 
 
 def test_a_tap_change_stands_where_the_line_ends_that_leads_to_the_regulator(
