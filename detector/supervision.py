@@ -131,6 +131,9 @@ def wiring_alarm(
     active_a = (positive_sequence(i) * v1.conj()).real / v_nominal_v
     alarm = np.zeros((len(terminals), v.shape[-1]), np.int8)
     for t, terminal in enumerate(terminals):
+        if far[t] < t:  # the other direction of a section that is judged
+            alarm[t] = alarm[far[t]]
+            continue
         ends = [terminal.local_point, terminal.remote_point]
         into = np.array([terminal.into, terminals[far[t]].into])
         sure = one_way is not None and bool(one_way[t])

@@ -147,10 +147,9 @@ def test_no_alarm_while_phases_are_open(build: Build) -> None:
     for mask in (1, 2, 4, 3, 5, 6, 7):
         state = states(at, rng, 40)
         for line, share in (("R1-R2", 0.5), ("R2-R3", 0.6), ("R3-R4", 0.2)):
-            wide = opened_all(at, state, line, share, mask)
-            assert (
-                alarms(at, measured(at, true_phasors(at, wide, wide), mask)) == Alarm.NONE
-            ).all()
+            before = opened_all(at, state, line, share, mask)
+            phasors = measured(at, true_phasors(at, before, before), mask)
+            assert (alarms(at, phasors) == Alarm.NONE).all()
 
 
 def opened_all(at: Scene, state: State, line: str, share: float, mask: int) -> State:
