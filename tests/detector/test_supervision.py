@@ -230,6 +230,20 @@ def test_the_unbalance_up_to_which_one_reversed_current_is_seen() -> None:
     assert all(missed[0.3, kind] > 0.0 for kind in ONE_CT)
 
 
+@pytest.mark.parametrize("sequence", [2, 0])
+def test_one_of_the_sequences_above_the_first_is_enough(sequence: int) -> None:
+    """With I0 (or I2) at -0.4 of I1, a reversed current on phase a leaves .6, .8 and .4 of it."""
+    at = radial()
+    turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
+    other = turn.conj() if sequence == 2 else np.ones((3, 1))
+    v = np.broadcast_to(7000.0 * turn, (2, 6, 3, 1))
+    phasors = Phasors(v=v, i=np.broadcast_to(10.0 * (turn - 0.4 * other), (2, 6, 3, 1)))
+    everywhere = np.ones(len(at.points.terminals), np.bool_)
+    for kind in (Wiring.RIGHT, Wiring.REVERSED_A):
+        found = wiring_alarm(wrong(phasors, 0, kind), at.points.terminals, 7000.0, everywhere)
+        assert (found[0, 0] == Alarm.ONE_CURRENT) == (kind == Wiring.REVERSED_A)
+
+
 def test_all_currents_reversed_where_power_passes_one_way() -> None:
     """R4, R4b and R5 have no power passing their sections, and are not seen."""
     at = radial()
