@@ -88,11 +88,6 @@ class Evidence:
         """Eq. (5) in the positive sequence, (T, S); 0 where undefined."""
         return self.z_ohm[:, 0]
 
-    @property
-    def undefined1(self) -> Flags:
-        """Where eq. (5) has no value in the positive sequence, (T, S)."""
-        return self.undefined[:, 0]
-
 
 def evidence_of(
     phasors: Phasors, terminals: tuple[Terminal, ...], v_nominal_v: float, *options: Options

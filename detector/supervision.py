@@ -5,8 +5,8 @@ only what a feeder in service cannot be. It sees
 
 - swapped phases, or voltages alone: the negative sequence of V exceeds the positive;
 - rotated phases at one end: the two ends' V1 lie far apart;
-- one reversed current transformer: I2 and I0 both exceed I1, which no load does that takes
-  power in every phase, and turning one phase's current round leaves little of either. Seen
+- one reversed current transformer: I2 or I0 exceeds I1, which no load makes that takes power
+  in every phase, and turning one phase's current round leaves little of either. Seen
   whatever the phase while the true |I2| and |I0| are below a seventh of |I1|, and up to half
   of it for favourable angles. Where the section can be fed from both sides, phases may in truth
   carry power in opposite directions; there the turn must also balance what the section takes,
@@ -58,7 +58,7 @@ _TEXT = {
     Alarm.NONE: "none",
     Alarm.PHASE_ORDER: "voltages in the wrong phase order: |V2| above |V1|",
     Alarm.ENDS_APART: "V1 of the two ends far apart: labels rotated?",
-    Alarm.ONE_CURRENT: "one current reversed: |I2| and |I0| above |I1|",
+    Alarm.ONE_CURRENT: "one current reversed: |I2| or |I0| above |I1|",
     Alarm.ALL_CURRENTS: "all currents of one end reversed: no power passes the section",
 }
 
@@ -131,6 +131,9 @@ def wiring_alarm(
     active_a = (positive_sequence(i) * v1.conj()).real / v_nominal_v
     alarm = np.zeros((len(terminals), v.shape[-1]), np.int8)
     for t, terminal in enumerate(terminals):
+        if far[t] < t:  # the other direction of a section that is judged
+            alarm[t] = alarm[far[t]]
+            continue
         ends = [terminal.local_point, terminal.remote_point]
         into = np.array([terminal.into, terminals[far[t]].into])
         sure = one_way is not None and bool(one_way[t])
@@ -161,7 +164,7 @@ def _turned(i: Complex, limits: Limits) -> Flags:
     """(P, 3, S): phases whose current, of (P, 3, S), seems to be turned round."""
     found = np.zeros(i.shape, np.bool_)
     size, i2, i0 = _sizes(i)
-    suspect = np.minimum(i2, i0) > size
+    suspect = np.maximum(i2, i0) > size
     if suspect.any():
         p, s = np.nonzero(suspect)
         for k in range(3):

@@ -147,10 +147,9 @@ def test_no_alarm_while_phases_are_open(build: Build) -> None:
     for mask in (1, 2, 4, 3, 5, 6, 7):
         state = states(at, rng, 40)
         for line, share in (("R1-R2", 0.5), ("R2-R3", 0.6), ("R3-R4", 0.2)):
-            wide = opened_all(at, state, line, share, mask)
-            assert (
-                alarms(at, measured(at, true_phasors(at, wide, wide), mask)) == Alarm.NONE
-            ).all()
+            before = opened_all(at, state, line, share, mask)
+            phasors = measured(at, true_phasors(at, before, before), mask)
+            assert (alarms(at, phasors) == Alarm.NONE).all()
 
 
 def opened_all(at: Scene, state: State, line: str, share: float, mask: int) -> State:
@@ -229,6 +228,20 @@ def test_the_unbalance_up_to_which_one_reversed_current_is_seen() -> None:
             missed[share, kind] = (found != Alarm.ONE_CURRENT).mean()
     assert [missed[0.142, kind] for kind in ONE_CT] == [0.0, 0.0, 0.0]
     assert all(missed[0.3, kind] > 0.0 for kind in ONE_CT)
+
+
+@pytest.mark.parametrize("sequence", [2, 0])
+def test_one_of_the_sequences_above_the_first_is_enough(sequence: int) -> None:
+    """With I0 (or I2) at -0.4 of I1, a reversed current on phase a leaves .6, .8 and .4 of it."""
+    at = radial()
+    turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
+    other = turn.conj() if sequence == 2 else np.ones((3, 1))
+    v = np.broadcast_to(7000.0 * turn, (2, 6, 3, 1))
+    phasors = Phasors(v=v, i=np.broadcast_to(10.0 * (turn - 0.4 * other), (2, 6, 3, 1)))
+    everywhere = np.ones(len(at.points.terminals), np.bool_)
+    for kind in (Wiring.RIGHT, Wiring.REVERSED_A):
+        found = wiring_alarm(wrong(phasors, 0, kind), at.points.terminals, 7000.0, everywhere)
+        assert (found[0, 0] == Alarm.ONE_CURRENT) == (kind == Wiring.REVERSED_A)
 
 
 def test_all_currents_reversed_where_power_passes_one_way() -> None:
