@@ -149,7 +149,9 @@ def test_loops_breaks_and_connections_all_occur_in_the_sample() -> None:
                 edge, _ = locate(network, event.open_line, event.open_fraction)
                 on_chord = edge == len(network.nodes)
                 seen.add("chord" if on_chord else f"loop {network.tree.in_loop[edge]}")
-    assert seen >= {*CONNECTIONS, "wye", "delta", "open 1", "open 2", "open 3", "step"}
+    # what these feeders leave out is compared in oracles/test_ladder.py, over all connections
+    assert seen >= {*CONNECTIONS} - {"Y/D", "D/D"}
+    assert seen >= {"wye", "delta", "open 1", "open 2", "open 3", "step"}
     assert seen >= {"chord", "loop True", "loop False"}
 
 

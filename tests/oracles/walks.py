@@ -1,0 +1,69 @@
+"""How a line lies to a section, by taking the feeder apart: slow, and easy to believe."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from openphase.model.parts import Feeder, Section
+from openphase.model.points import Side
+
+__all__ = ["side_of", "without_source"]
+
+Thing = tuple[str, str]
+"""What can be reached: a ("bus", name), or a ("line", name), switch or regulator."""
+
+
+def side_of(feeder: Feeder, section: Section, line: str) -> Side:
+    """The Side of ``line``, in the feeder's normal state, which must be a tree."""
+    points = {point.name: point for point in feeder.points}
+    local, remote = (("bus", points[name].bus) for name in (section.local, section.remote))
+    lines: list[Thing] = [("line", own.name) for own in feeder.lines]
+    path = [own for own in lines if remote not in _reached(feeder, local, [own])]
+    own, source = ("line", line), ("bus", feeder.source.bus)
+    if own in path:
+        return Side.PATH
+    # parted from its bus wherever a point measures what flows into it
+    parted = {("bus", point.bus, point.line) for point in feeder.points}
+    if any(own in _reached(feeder, part, [], parted) for part in path):
+        return Side.LATERAL
+    if own not in _reached(feeder, source, path):
+        return Side.DOWNSTREAM
+    # without the source bus, and what is joined to it without a line, branches fall apart
+    head = _reached(feeder, source, lines)
+    if any(own in _reached(feeder, part, head) for part in path):
+        return Side.UPSTREAM
+    return Side.OTHER
+
+
+def without_source(feeder: Feeder, line: str) -> set[str]:
+    """Buses that have no supply where ``line`` is out, in the normal state."""
+    source: Thing = ("bus", feeder.source.bus)
+    lost = _reached(feeder, source, []) - _reached(feeder, source, [("line", line)])
+    return {name for kind, name in lost if kind == "bus"}
+
+
+def _reached(
+    feeder: Feeder,
+    start: Thing,
+    without: Collection[Thing],
+    parted: Collection[tuple[str, str, str]] = (),
+) -> set[Thing]:
+    """All that is joined to ``start``, where some things are taken out or parted from a bus."""
+    joints = [
+        (("bus", bus), (kind, part.name))
+        for kind, parts in (
+            ("line", feeder.lines),
+            ("switch", [switch for switch in feeder.switches if switch.closed]),
+            ("regulator", feeder.regulators),
+        )
+        for part in parts
+        for bus in (part.from_bus, part.to_bus)
+        if ("bus", bus, part.name) not in parted
+    ]
+    found: set[Thing] = {start}
+    grown = True
+    while grown:
+        near = {end for joint in joints if found & set(joint) for end in joint} - set(without)
+        grown = not near <= found
+        found |= near
+    return found
