@@ -263,7 +263,7 @@ WANTED = {
     *("DER z0", "capacitor wye", "capacitor delta", "regulator", "opened point"),
     *("at an end", "on the chord", "in the loop", "on a tree", "nowhere"),
     *("open 1", "open 2", "open 3", "open before", "closing", "step", "earth fault"),
-    *("line fault", "fallen", "far", "emf", "tap", "loads", "ders"),
+    *("line fault", "fallen", "far", "far, between", "emf", "tap", "loads", "ders"),
 }
 
 
