@@ -19,7 +19,7 @@ from .states import Answer, Probes, State, workspace
 __all__ = ["FLOOR_PU", "all_probes", "new_answer", "quiet_state", "solve", "steady_state"]
 
 TOLERANCE_PU = 1e-12  #: largest change of a winding voltage in the last pass
-MOST_PASSES = 200
+MOST_PASSES = 300
 
 
 def all_probes(network: Network) -> Probes:

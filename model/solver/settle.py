@@ -13,7 +13,9 @@ __all__ = ["is_linear", "positive", "update_magnitudes"]
 
 Real = NDArray[np.float64]
 
-PATIENCE = 60  #: passes before the steps are halved
+SECANT_PASSES = 60  #: by then the secant has settled the loads, or it wanders
+PLAIN_PASSES = 260  #: by then plain steps have; what rounding still moves takes short ones
+SHORT_STEP = 0.35
 
 
 @compiled
@@ -22,9 +24,9 @@ def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, pa
 
     The gap is in pu, of the largest voltage where that exceeds nominal. From the second pass
     on the step follows the secant through this pass and the last (Anderson's mixing of depth
-    one), which also ends cycles and creeping near collapse; what wanders all the same takes
-    half steps after ``PATIENCE`` passes. ``history`` (3, U + 1, 4): the last pass's voltages
-    and gaps, and this pass's gaps.
+    one), which also ends cycles and creeping near collapse; what wanders all the same settles
+    in plain steps. ``history`` (3, U + 1, 4): the last pass's voltages and gaps, and this
+    pass's gaps.
     """
     unit_node, g, g_j, v_all, stub = tree.unit_node, work.g, work.g_j, work.v, work.stub
     units = unit_node.size
@@ -48,8 +50,9 @@ def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, pa
             along += gap * turn
             across += turn * turn
             history[2, unit, i] = gap
-    back = 0.0 if passes == 1 or passes > PATIENCE or across == 0.0 else along / across
-    step = 0.5 if passes > PATIENCE else 1.0
+    plain = passes == 1 or passes > SECANT_PASSES or across == 0.0
+    back = 0.0 if plain else along / across
+    step = SHORT_STEP if passes > PLAIN_PASSES else 1.0
     for unit in range(units + 1):
         for i in range(last):
             v_pu, gap = unit_v_pu[unit, i], history[2, unit, i]

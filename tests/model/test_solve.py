@@ -10,7 +10,7 @@ from oracles.dense import DenseSolution, Event, solve_dense
 from oracles.random_feeders import random_event, random_feeder
 
 from openphase.model import load_feeder
-from openphase.model.network import CONNECTIONS, Network, compile_network, locate
+from openphase.model.network import Network, compile_network, locate
 from openphase.model.parts import Feeder, Place
 from openphase.model.solve import solve, steady_state
 from openphase.model.solver.breaks import DEAD, FLOATING

@@ -29,6 +29,7 @@ from oracles.dense_circuit import (
     Floats,
     Found,
     Group,
+    NoSolutionError,
     NotConvergedError,
     solve_circuit,
 )
@@ -52,7 +53,15 @@ from oracles.dense_parts import (
 
 from openphase.model.parts import Connection, Feeder, Line, Place
 
-__all__ = ["FORTESCUE", "DenseSolution", "Event", "NotConvergedError", "Shunt", "solve_dense"]
+__all__ = [
+    "FORTESCUE",
+    "DenseSolution",
+    "Event",
+    "NoSolutionError",
+    "NotConvergedError",
+    "Shunt",
+    "solve_dense",
+]
 
 STEP_NODE = "tee step"
 FLOATING_TOLERANCE = 1e-7
@@ -209,7 +218,8 @@ def solve_dense(
     Raises
     ------
     NotConvergedError
-        The voltage-dependent loads have no fixed point in reach.
+        The voltage-dependent loads have no fixed point in reach; as NoSolutionError, no
+        voltages fulfil the equations.
     """
     happening = event or Event()
     _check(feeder, happening, closed, opened)

@@ -21,6 +21,7 @@ __all__ = [
     "Floats",
     "Found",
     "Group",
+    "NoSolutionError",
     "NotConvergedError",
     "Terminal",
     "machine_matrix",
@@ -49,6 +50,10 @@ FORTESCUE: Complex = np.array([[1, 1, 1], [1, A**2, A], [1, A, A**2]], dtype=np.
 
 class NotConvergedError(RuntimeError):
     """No state was found in which voltages and what depends on them agree."""
+
+
+class NoSolutionError(NotConvergedError):
+    """No state fulfils the equations, such as a current source with no way back."""
 
 
 def machine_matrix(y0: complex, y1: complex, y2: complex) -> Complex:
@@ -244,7 +249,7 @@ class _Bordered:
         self.matrix = matrix
         self.factors, self.pivots, singular = zgetrf(matrix)
         if singular:
-            raise NotConvergedError("the circuit's equations have no one solution")
+            raise NoSolutionError("the circuit's equations have no one solution")
 
     def solve(self, rhs: Complex) -> Complex:
         padded = np.concatenate([rhs, np.zeros((self.free, *rhs.shape[1:]))])
@@ -325,7 +330,7 @@ def solve_circuit(circuit: Circuit, start: Mapping[str, Floats], *, hold: bool =
     whole = _Bordered(parts.fixed + parts.into @ y @ parts.across, left, right)
     x = whole.solve(rhs)
     if whole.contradiction > 1e-9:
-        raise NotConvergedError("the circuit's equations contradict one another")
+        raise NoSolutionError("the circuit's equations contradict one another")
     v = parts.across @ x
     # the reduction at the start's admittances may be worse conditioned than the whole
     worse = np.abs(magnitudes(v) - pu)[bends & (pu > FLOOR_PU)].max(initial=0.0)

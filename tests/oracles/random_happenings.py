@@ -48,6 +48,10 @@ def random_happening(rng: np.random.Generator, feeder: Feeder, network: Network)
         before, after = _steps(rng, v) if rng.random() < 0.6 else (_none(), _fault(rng))
         node = np.array([rng.integers(len(network.nodes))])
         event = replace(event, far_node=node, far_before_s=before, far_after_s=after)
+        if rng.random() < 0.4:
+            what.add("far, between")
+            before, after = _steps(rng, v) if rng.random() < 0.6 else (_none(), _fault(rng))
+            event = replace(event, far_between_before_s=before, far_between_after_s=after)
     if rng.random() < 0.2:
         what.add("emf")
         event = replace(event, emf_factor=np.array([rng.uniform(0.9, 1.05)]))
@@ -186,7 +190,12 @@ def dense_event(
         node = network.nodes[int(event.far_node[0])]
         far = Place(bus=detached[node]) if node in detached else _place(node)
         y = event.far_after_s if after else event.far_before_s
-        shunts += [Shunt(where="far", phase=k, siemens=complex(y[k, 0])) for k in range(3)]
+        between = event.far_between_after_s if after else event.far_between_before_s
+        for k in range(3):
+            shunts.append(Shunt(where="far", phase=k, siemens=complex(y[k, 0])))
+            shunts.append(
+                Shunt(where="far", phase=k, other=(k + 1) % 3, siemens=complex(between[k, 0]))
+            )
     found = replace(found, shunts=tuple(x for x in shunts if x.siemens), far=far)
     if not after:
         return found

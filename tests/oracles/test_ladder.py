@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from oracles.dense import DenseSolution, NotConvergedError, solve_dense
+from oracles.dense import DenseSolution, NoSolutionError, NotConvergedError, solve_dense
 from oracles.dense import Event as DenseEvent
 from oracles.random_elements import random_full_feeder
 from oracles.random_happenings import Happening, dense_event, random_happening
@@ -156,26 +156,33 @@ def winding_voltages(
 class Outcome:
     """How one state compares."""
 
-    how: Literal["agree", "elsewhere", "differ", "unsettled", "reference unsettled"]
+    how: Literal["agree", "elsewhere", "differ", "unsettled", "no solution", "reference unsettled"]
     gap: float = np.inf
     floating: bool = False  #: the reference finds undetermined voltages
     flagged: bool = False  #: so does the ladder
 
 
 def compare(
-    case: Case, answer: Answer, event: DenseEvent, oracle: DenseSolution, **state: Any
-) -> tuple[Outcome, DenseSolution]:
+    case: Case, answer: Answer, event: DenseEvent, start: DenseSolution | None, **state: Any
+) -> tuple[Outcome, DenseSolution | None]:
     """The ladder's answer against the reference; and the reference at the same state.
 
     Where several operating points exist the reference may have found another. Then what the
     ladder found must be one as well: the reference, held at the ladder's voltages, must give
     them back.
     """
+    flagged = bool(answer.flags[0] & (DEAD | FLOATING))
+    try:
+        oracle = solve_dense(case.feeder, case.closed, event, start=start, **state)
+    except NoSolutionError:
+        return Outcome(how="no solution", flagged=flagged), None
+    except NotConvergedError:
+        return Outcome(how="reference unsettled", flagged=flagged), None
     found = Outcome(
         how="unsettled" if answer.flags[0] & NOT_CONVERGED else "agree",
         gap=gap_pu(case, answer, oracle, event),
         floating=bool(oracle.floating),
-        flagged=bool(answer.flags[0] & (DEAD | FLOATING)),
+        flagged=flagged,
     )
     if found.how == "unsettled" or found.gap <= TOLERANCE:
         return found, oracle
@@ -183,7 +190,7 @@ def compare(
     held = solve_dense(case.feeder, case.closed, event, start=start, hold=True, **state)
     moved = max(np.abs(held.load_pu[name] - pu).max() for name, pu in start.load_pu.items())
     gap = gap_pu(case, answer, held, event)
-    if max(gap, moved) > 10 * TOLERANCE:
+    if max(gap, moved) > TOLERANCE:
         return replace(found, how="differ"), oracle
     return replace(found, how="elsewhere", gap=gap), held
 
@@ -193,26 +200,16 @@ def outcomes(case: Case) -> list[Outcome]:
     network, event = case.network, case.happening.event
     steady = steady_state(network)
     first, second = apply_event(network, steady, steady, event)
-    before = solve(network, first)
-    place: dict[str, Any] = {"opened": case.opened}
-    found: list[Outcome] = []
-    try:
-        dense = case.event(after=False)
-        oracle = solve_dense(case.feeder, case.closed, dense, **place)
-        outcome, oracle = compare(case, before, dense, oracle, **place)
-        found.append(outcome)
-        if outcome.how not in ("agree", "elsewhere"):
-            return found
-        second = carried_over(network, first, before, second, event.der_factor)
-        after = solve(network, second, start=before.unit_v_pu)
-        dense = case.event(after=True)
-        scale = {name: float(event.load_factor[n, 0]) for n, name in enumerate(network.loads)}
-        place |= {"before": oracle, "load_scale": scale}
-        oracle = solve_dense(case.feeder, case.closed, dense, start=oracle, **place)
-        found.append(compare(case, after, dense, oracle, **place)[0])
-    except NotConvergedError:
-        found.append(Outcome(how="reference unsettled"))
-    return found
+    answer = solve(network, first)
+    state: dict[str, Any] = {"opened": case.opened}
+    before, oracle = compare(case, answer, case.event(after=False), None, **state)
+    if before.how not in ("agree", "elsewhere"):
+        return [before]
+    second = carried_over(network, first, answer, second, event.der_factor)
+    answer = solve(network, second, start=answer.unit_v_pu)
+    scale = {name: float(event.load_factor[n, 0]) for n, name in enumerate(network.loads)}
+    state |= {"before": oracle, "load_scale": scale}
+    return [before, compare(case, answer, case.event(after=True), oracle, **state)[0]]
 
 
 @pytest.fixture(scope="module")
@@ -229,20 +226,23 @@ def seeds_that(sample: Sample, *how: str) -> list[int]:
 def test_no_state_differs(sample: Sample) -> None:
     assert not seeds_that(sample, "differ")
     gaps = [x.gap for _, found in sample.values() for x in found if x.how == "agree"]
-    assert len(gaps) > 1.95 * FEEDERS
+    assert len(gaps) >= 1.97 * FEEDERS
     assert max(gaps) <= TOLERANCE
 
 
-def test_few_are_unsettled_or_elsewhere(sample: Sample) -> None:
-    assert len(seeds_that(sample, "unsettled")) <= FEEDERS // 100
-    assert len(seeds_that(sample, "reference unsettled")) <= FEEDERS // 100
+def test_the_ladder_settles(sample: Sample) -> None:
+    assert not seeds_that(sample, "unsettled")
     assert len(seeds_that(sample, "elsewhere")) <= FEEDERS // 50
+    assert len(seeds_that(sample, "reference unsettled")) <= FEEDERS // 100
 
 
-def test_what_is_undetermined_is_flagged_and_rare(sample: Sample) -> None:
-    floating = [x for _, found in sample.values() for x in found if x.floating]
-    assert all(x.flagged for x in floating)
-    assert 0 < len(floating) < 0.1 * FEEDERS
+def test_what_is_undetermined_or_has_no_solution_is_flagged_and_rare(sample: Sample) -> None:
+    states = [x for _, found in sample.values() for x in found]
+    floating = [x for x in states if x.floating]
+    impossible = [x for x in states if x.how == "no solution"]
+    assert all(x.flagged for x in [*floating, *impossible])
+    assert 0 < len(floating) <= 0.05 * len(states)
+    assert len(impossible) <= FEEDERS // 100
 
 
 def test_every_element_and_event_is_in_the_sample(sample: Sample) -> None:
@@ -263,7 +263,7 @@ WANTED = {
     *("DER z0", "capacitor wye", "capacitor delta", "regulator", "opened point"),
     *("at an end", "on the chord", "in the loop", "on a tree", "nowhere"),
     *("open 1", "open 2", "open 3", "open before", "closing", "step", "earth fault"),
-    *("line fault", "fallen", "far", "emf", "tap", "loads", "ders"),
+    *("line fault", "fallen", "far", "far, between", "emf", "tap", "loads", "ders"),
 }
 
 
