@@ -12,11 +12,11 @@ import pytest
 from numpy.typing import NDArray
 from oracles.random_elements import random_full_feeder
 
-from openphase.model.solver.bank import D_YG, YG_D, YG_YG, bank, plain_bank
 from openphase.model.compiled import compiled
-from openphase.model.solver.assemble import add_circulant
 from openphase.model.network import Network, compile_network
 from openphase.model.solve import solve, steady_state
+from openphase.model.solver.assemble import add_circulant
+from openphase.model.solver.bank import D_YG, YG_D, YG_YG, bank, plain_bank
 from openphase.model.symmetrical import phase_matrix
 
 Complex = NDArray[np.complex128]

@@ -16,12 +16,12 @@ from scipy.stats import spearmanr
 
 from openphase.detector.criteria import Reason, Settings, verdict
 from openphase.detector.instruments import Wiring
-from openphase.model.solver.breaks import DEAD, FLOATING
 from openphase.model.distributions import Choices, Fixed
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
 from openphase.model.parts import Feeder
 from openphase.model.points import Side, find_points
+from openphase.model.solver.breaks import DEAD, FLOATING
 from openphase.model.states import NOT_CONVERGED
 from openphase.studies.run.cases import Wired
 from openphase.studies.run.classes import REPORTED, DrawClass, Purpose, reported_row
@@ -252,7 +252,7 @@ def test_der_levels_motors_and_loads_arrive_where_they_belong() -> None:
     assert own.motor_load.size == motors  # the study gives every load a motor
     level = -state.machine_va[motors:] / own.der_va[:, None]
     np.testing.assert_allclose(level, np.broadcast_to(level[0], level.shape), rtol=1e-12)
-    assert 0.0 <= level.real.min()
+    assert level.real.min() >= 0.0
     assert level.real.max() <= 1.0
     taken = state.machine_va[:motors] / own.load_va[:, None]
     whole = taken.real + state.load_scale
