@@ -102,7 +102,7 @@ def test_the_sample_has_plain_banks_of_every_form() -> None:
 
 
 def test_compiled_code_counts_no_references() -> None:
-    """By a private option of numba's. That it is heeded shows in what it forbids: making an array."""
+    """By a private option of numba's, which is heeded: it forbids to make an array."""
 
     def careless(size: int) -> Complex:
         return np.zeros(size, np.complex128)

@@ -49,9 +49,7 @@ def whole_feeder(wires: int = 4) -> Feeder:
     lines["R2-M"] = replace(lines["R2-R3"], name="R2-M", to_bus="M", length_km=2.0)
     lines["M2-R3"] = replace(lines.pop("R2-R3"), name="M2-R3", from_bus="M2", length_km=3.0)
     for name, (start, end, km) in {**LATERALS, "LX": ("SUB", "X", 4.0)}.items():
-        lines[name] = replace(
-            lines["R1-R2"], name=name, from_bus=start, to_bus=end, length_km=km
-        )
+        lines[name] = replace(lines["R1-R2"], name=name, from_bus=start, to_bus=end, length_km=km)
     feeder = replace(
         paper,
         name="whole",
@@ -62,7 +60,9 @@ def whole_feeder(wires: int = 4) -> Feeder:
             neutral_ohm=4.0 + 0j if wires == 4 else 0j,
         ),
         lines=tuple(_charged(line) for line in lines.values()),
-        transformers=tuple(_unit(paper, name, wires) for name in ("T1", "T2", "T3", "T4", "T5", "T6")),
+        transformers=tuple(
+            _unit(paper, name, wires) for name in ("T1", "T2", "T3", "T4", "T5", "T6")
+        ),
         loads=(
             *(replace(load, motor_share=0.3, exponent=1.5) for load in paper.loads),
             *(_direct(name, at, kw, wires) for name, at, kw in DIRECT),
@@ -75,9 +75,7 @@ def whole_feeder(wires: int = 4) -> Feeder:
                 connection="wye" if wires == 4 else "delta",
                 kvar=150.0,
             ),
-            Capacitor(
-                name="C2", place=Place(line="LT", at=0.5), connection="delta", kvar=100.0
-            ),
+            Capacitor(name="C2", place=Place(line="LT", at=0.5), connection="delta", kvar=100.0),
         ),
         regulators=(
             Regulator(

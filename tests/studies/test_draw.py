@@ -157,9 +157,10 @@ def test_what_the_feeder_cannot_have_is_not_drawn(case: Case) -> None:
     assert set(DRAWN) - set(fewer.drawn) == {DrawClass.WIRING, DrawClass.LOAD_SWAP}
     still = replace(case.study.events.tie_switching, states=())
     events = replace(case.study.events, tie_switching=still)
-    assert DrawClass.TIE_SWITCHING not in make_case(
-        case.feeder, replace(case.study, events=events)
-    ).drawn
+    assert (
+        DrawClass.TIE_SWITCHING
+        not in make_case(case.feeder, replace(case.study, events=events)).drawn
+    )
 
 
 # --- the feeder's state ----------------------------------------------------------------

@@ -48,7 +48,9 @@ def cases(wires: int) -> tuple[Case, ...]:
     return make_cases(feeder, whole_study(feeder))
 
 
-def block(case: Case, drawn: DrawClass, number: int = 0, purpose: Purpose = Purpose.TRAIN) -> BlockId:
+def block(
+    case: Case, drawn: DrawClass, number: int = 0, purpose: Purpose = Purpose.TRAIN
+) -> BlockId:
     return BlockId(
         seed=3, purpose=purpose, attempt=1, drawn=drawn, block=number, group=case.group.index
     )
