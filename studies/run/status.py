@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from ...optimise.staircase import Front, factors, nearest
 from ...optimise.thresholds import Choice, Obstacle, Refusal
 from ...optimise.windows import Window, loop_window, overlap, remedy
+from ..spec.parts import Study
 from .blocks import block_name
 from .cases import Case
 from .classes import REPORTED, DrawClass, Purpose
 from .draw import BlockId
-from ..spec.parts import Study
 
 __all__ = [
     "common_window",
