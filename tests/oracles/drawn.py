@@ -1,4 +1,4 @@
-"""Drawn scenarios as the dense reference takes them: one at a time, from the states' own numbers."""
+"""Drawn scenarios for the dense reference: one at a time, from the numbers of their states."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 from oracles.dense import DenseSolution, solve_dense
 from oracles.random_happenings import dense_event
-from oracles.scalar_detector import Looks, looks_at
 
 from openphase.detector.instruments import Errors, Wiring
 from openphase.model.events.base import Event
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network, detached_end
 from openphase.model.parts import Feeder
-from openphase.model.points import Terminal
 from openphase.model.states import State
 from openphase.studies.run.cases import Case, Wired
 from openphase.studies.run.draw import Scenarios
 
-__all__ = ["Frames", "frames_of", "looks_from", "perfect"]
+__all__ = ["Frames", "frames_of", "perfect", "reported"]
 
 NAMES = {code: name for name, code in CONNECTIONS.items()}
 SWITCHES = frozenset[str]
+Ends = tuple[list[list[list[complex]]], list[list[list[complex]]]]
+"""Volts and amperes by frame, end and phase."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,23 +74,18 @@ def frames_of(case: Case, scenarios: Scenarios, s: int) -> Frames:
     return _measured(feeder, solved, opened_in)
 
 
-def looks_from(
-    frames: Frames, terminal: Terminal, far: Terminal, v_nominal_v: float, wrong: tuple[int, int]
-) -> Looks:
-    """What a terminal sees, ``wrong`` being a point and how it is wired."""
-    ends = [terminal.local_point, terminal.remote_point]
-    v = [[list(frame[p]) for p in ends] for frame in frames.v]
-    i = [[list(frame[p]) for p in ends] for frame in frames.i]
-    for end, point in enumerate(ends):
+def reported(frames: Frames, points: tuple[int, int], wrong: tuple[int, int]) -> Ends:
+    """V and I of the two ends of a section, ``wrong`` being a point and how it is wired."""
+    v = [[list(frame[p]) for p in points] for frame in frames.v]
+    i = [[list(frame[p]) for p in points] for frame in frames.i]
+    for end, point in enumerate(points):
         if point == wrong[0]:
             for frame in (0, 1):
                 v[frame][end], i[frame][end] = _miswired(v[frame][end], i[frame][end], wrong[1])
-    return looks_at(v, i, (terminal.into, far.into), v_nominal_v)
+    return v, i
 
 
-def _miswired(
-    v: list[complex], i: list[complex], kind: int
-) -> tuple[list[complex], list[complex]]:
+def _miswired(v: list[complex], i: list[complex], kind: int) -> tuple[list[complex], list[complex]]:
     """What is reported, by the name of the wrong wiring."""
     name = Wiring(kind).name
     order = [0, 1, 2]

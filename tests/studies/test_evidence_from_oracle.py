@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracles.drawn import Frames, frames_of, looks_from, perfect
-from oracles.scalar_detector import Looks
+from oracles.drawn import Frames, frames_of, perfect, reported
+from oracles.scalar_detector import looks_at
 from oracles.whole import whole_feeder, whole_study
 
 from openphase.detector.evidence import reversed_terminals
@@ -56,26 +56,37 @@ def drawn(case: Case, own: DrawClass, number: int = 0) -> Scenarios:
 
 
 def agree(case: Case, seen: engine.Observed, frames: Frames, wrong: tuple[int, int], s: int) -> int:
-    """Compare every terminal; returns how many impedances were large enough to be compared."""
+    """Compare every terminal; returns how many impedances could be compared."""
     terminals, v_nominal = case.points.terminals, case.feeder.source.v_phase_v
     evidence, far = seen.evidence, reversed_terminals(case.points.terminals)
     compared = 0
     for t, terminal in enumerate(terminals):
-        if {terminal.local_point, terminal.remote_point} & frames.floating:
+        points = (terminal.local_point, terminal.remote_point)
+        if set(points) & frames.floating:
             continue
-        looks: Looks = looks_from(frames, terminal, terminals[far[t]], v_nominal, wrong)
-        currents = [abs(i) for frame in frames.i for i in frame[terminal.local_point]]
-        off_a = OFF_A * max(1.0, *currents)
+        v, i = reported(frames, points, wrong)
+        looks = looks_at(v, i, (terminal.into, terminals[far[t]].into), v_nominal)
+        off_v, off_a = OFF_PU * v_nominal, OFF_A * max(1.0, *(abs(x) for x in [*i[0][0], *i[1][0]]))
         np.testing.assert_allclose(evidence.di_a[t, :, s], looks.di_a, atol=off_a)
         np.testing.assert_allclose(evidence.dv_pu[t, :, s], looks.dv_pu, atol=OFF_PU)
         assert evidence.blocked[t, s] == looks.blocked
         for r, z in enumerate(looks.z_ohm):
-            # eq. (5) loses what ΔI and ΔV lose, more where they nearly cancel
-            lost = 10.0 * (OFF_PU * v_nominal + abs(z) * off_a) / max(looks.di_star_a[r], 1e-12)
-            if lost < 1e-3 * abs(z):
+            local, remote, current = (row(x, r) for x in (v[1][0], v[1][1], i[1][0]))
+            # eq. (5) is above / below, and each of the two loses what its differences lose
+            above = 2.0 * off_v * (abs(local) + abs(remote))
+            below = 2.0 * (off_a * abs(local) + off_v * abs(current))
+            whole = abs(row(v[0][0], r)) * looks.di_star_a[r]
+            lost = (above + below * abs(z)) / max(whole, 1e-12)
+            if below < 1e-2 * whole and lost < 1e-3 * max(abs(z), 1.0):
                 assert abs(evidence.z_ohm[t, r, s] - z) <= lost
                 compared += 1
     return compared
+
+
+def row(abc: list[complex], r: int) -> complex:
+    """The positive sequence (0) of three phases, or one of them."""
+    turn = np.exp(2j * np.pi / 3)
+    return abc[r - 1] if r else complex(abc[0] + turn * abc[1] + turn**2 * abc[2]) / 3.0
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -97,3 +108,58 @@ def test_evidence_agrees_with_the_dense_solution(
             frames = frames_of(case, scenarios, s)
             compared += agree(case, seen, frames, (point if how else -1, how), s)
     assert compared > SIZE
+
+
+@pytest.mark.parametrize("own", list(DrawClass), ids=lambda own: own.name.lower())
+def test_the_solver_s_tolerance_is_far_below_the_instruments(
+    own: DrawClass, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Blocks are solved to 1e-7 pu; against 1e-12, ΔI and ΔV hardly change."""
+    case = case_of("four wires")
+    scenarios = drawn(case, own)
+    rough = engine.observe(case, scenarios).evidence
+    monkeypatch.setattr(engine, "TOLERANCE_PU", EXACT_PU)
+    fine = engine.observe(case, scenarios).evidence
+    instruments = case.study.instruments
+    small_a = 0.02 * instruments.current_floor_a
+    small_pu = 0.02 * instruments.tve_pct / 100.0
+    assert np.abs(rough.di_a - fine.di_a).max() < small_a
+    assert np.abs(rough.dv_pu - fine.dv_pu).max() < small_pu
+
+
+@pytest.mark.parametrize("name", ["v_noise", "i_noise"])
+def test_every_frame_has_errors_of_its_own(name: str) -> None:
+    case = case_of("paper")
+    scenarios = drawn(case, DrawClass.LOAD_STEP)
+    exact = engine.observe(case, scenarios).evidence
+    for frame in (0, 1):
+        error = np.zeros_like(scenarios.errors.v_noise)
+        error[frame, :, 0] = 0.5  # one phase: equal errors of all three have no positive sequence
+        errors = replace(scenarios.errors, **{name: error})
+        seen = engine.observe(case, replace(scenarios, errors=errors)).evidence
+        assert not np.isclose(seen.z1_ohm, exact.z1_ohm).all()
+        pairs = [(seen.di1_a, exact.di1_a), (seen.dv1_pu, exact.dv1_pu)]
+        moved, still = pairs[::-1] if name == "v_noise" else pairs
+        assert not np.isclose(*moved).all()
+        np.testing.assert_array_equal(*still)
+
+
+@pytest.mark.parametrize("name", ["v_ratio", "v_angle", "i_ratio", "i_angle", "clock"])
+def test_what_lasts_of_the_errors_is_in_both_frames(name: str) -> None:
+    """With nothing happening it makes no change; with something it makes another."""
+    case = case_of("paper")
+    scenarios = drawn(case, DrawClass.LOAD_STEP)
+    lasting = np.full_like(getattr(scenarios.errors, name), 1.0)
+    errors = replace(scenarios.errors, **{name: lasting})
+    quiet = replace(scenarios, after=scenarios.before, errors=errors)
+    nothing = replace(quiet, event=replace(scenarios.event, emf_factor=np.ones(SIZE)))
+    still = engine.observe(case, nothing).evidence
+    assert still.di1_a.max() < 1e-4
+    assert still.dv1_pu.max() < 1e-6
+    bounds = replace(case.study.instruments, ratio_pct=30.0, angle_mrad=300.0, clock_us=1000.0)
+    coarse = replace(case, study=replace(case.study, instruments=bounds))
+    erring = engine.observe(coarse, replace(scenarios, errors=errors)).evidence
+    exact = engine.observe(case, scenarios).evidence
+    other = np.abs(erring.z1_ohm - exact.z1_ohm) > 1e-3 * np.abs(exact.z1_ohm)
+    # what turns V and I of both ends alike is no error of an impedance
+    assert other.any() == (name != "clock")
