@@ -100,7 +100,9 @@ def test_targets_are_seen_where_they_are_named() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_files_named_in_backquotes_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    named = re.findall(r"`((?:docs|tests|model|detector|optimise|studies|benchmarks)/[\w./-]+)`", text)
+    named = re.findall(
+        r"`((?:docs|tests|model|detector|optimise|studies|benchmarks)/[\w./-]+)`", text
+    )
     assert [name for name in named if "NNNN" not in name and not (ROOT / name).exists()] == []
 
 
@@ -128,8 +130,14 @@ def test_every_command_can_be_typed(page: Path) -> None:
 
 
 def test_commands_are_seen_where_they_stand() -> None:
-    text = "`openphase size x` and `.venv/bin/openphase check y`\n\n    openphase paper --json # so\n"
-    assert named_commands(text) == ["openphase size x", "openphase check y", "openphase paper --json"]
+    text = (
+        "`openphase size x` and `.venv/bin/openphase check y`\n\n    openphase paper --json # so\n"
+    )
+    assert named_commands(text) == [
+        "openphase size x",
+        "openphase check y",
+        "openphase paper --json",
+    ]
     assert named_commands((DOCS / "results.md").read_text(encoding="utf-8"))
 
 

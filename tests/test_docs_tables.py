@@ -94,7 +94,7 @@ def ask(*words: object) -> Any:
 
 
 @pytest.fixture(scope="module")
-def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
+def answers(tmp_path_factory: pytest.TempPathFactory) -> Answers:
     home = tmp_path_factory.mktemp("home")
     (home / "study.toml").write_text(STUDY, encoding="utf-8")
     drawn = ("--study", home / "study.toml", "--scenarios", 50, "--jobs", 1, "--out")
@@ -104,14 +104,16 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
         said = {
             "size": ask("size", "paper", *drawn, home / "a"),
             "reference": ask("assess", "paper", "--settings", "reference", *drawn, home / "b"),
-            "assess": ask("assess", "paper", "--settings", home / "a/settings.csv", *drawn, home / "c"),
+            "assess": ask(
+                "assess", "paper", "--settings", home / "a/settings.csv", *drawn, home / "c"
+            ),
         }
         said["compare"] = ask("compare", home / "a", home / "b")
         said["other way"] = ask("compare", home / "b", home / "a")
     said["solve"] = ask("solve", "paper", "--open", "R2-R3:0.6:a")
     said["check"] = ask("check", "paper")
     said["paper"] = ask("paper")
-    yield Answers(said=said, folder=home / "a")
+    return Answers(said=said, folder=home / "a")
 
 
 def objects(value: Any, path: str) -> Iterator[dict[str, Any]]:
@@ -193,7 +195,9 @@ def test_no_object_of_an_answer_is_left_out(answers: Answers) -> None:
 
 
 def test_every_file_of_a_run_folder_is_documented(answers: Answers) -> None:
-    listed = set(re.findall(r"`([\w./*]+)`", " ".join(r[0] for r in rows(RESULTS, "The run folder"))))
+    listed = set(
+        re.findall(r"`([\w./*]+)`", " ".join(r[0] for r in rows(RESULTS, "The run folder")))
+    )
     there = {f"{p.name}/" if p.is_dir() else p.name for p in answers.folder.iterdir()}
     assert there <= listed
     assert listed - there == {"report.html", "*.png"}, "the run was made without its report"
