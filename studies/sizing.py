@@ -41,7 +41,7 @@ from .run.session import (
     run_until_enough,
     validate,
 )
-from .run.status import nearest_false_trip, refusal_text
+from .run.status import nearest_false_trip, refusal_in_brief, refusal_text
 from .run.store import RunFolder, as_json, npz, pack
 from .run.tally import Trained, train_block
 from .show.report import write_report
@@ -92,7 +92,7 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     watch = Watch()
     trainings = tuple(_train(case, attempt, folder, demand.jobs) for case in cases)
     watch.lap("train_s")
-    chosen = choices(cases, cases[0].grid, trainings)
+    chosen = choices(cases, trainings)
     watch.lap("choose_s")
     rivals = [
         [_rivals(case, t, own) for t, own in enumerate(own_group)]
@@ -185,20 +185,19 @@ def _rivals(case: Case, t: int, chosen: Chosen | None) -> tuple[Rival, ...]:
     if chosen is None:
         names = ("chosen", BEST_AT_REFERENCE, "reference")
         return tuple(Rival(name=name, settings=None) for name in names)
-    keeps = f"keeps the margin {study.certificate.margin:g}"
     wanted = f"V_set {study.reference.v_set_pct:.10g} %"
     return (
         Rival(
             name="chosen",
             settings=as_settings(study, chosen.best),
-            missing=f"no setting {keeps}",
+            missing=refusal_in_brief(study, chosen.best),
         ),
         Rival(
             name=BEST_AT_REFERENCE,
             settings=as_settings(study, chosen.at_reference_v),
             missing=f"the device has no {wanted.replace('V_set', 'V_set of')}"
             if chosen.at_reference_v is None
-            else f"no setting with {wanted} {keeps}",
+            else refusal_in_brief(study, chosen.at_reference_v, f" with {wanted}"),
         ),
         Rival(name="reference", settings=reference_settings(study)),
     )

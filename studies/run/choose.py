@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...detector.criteria import Settings
-from ...optimise.counts import Corners, Grid, merge
+from ...optimise.counts import Corners, merge
 from ...optimise.staircase import Front, merge_fronts
 from ...optimise.thresholds import Choice, Refusal, Sample, choose, pool
 from ..spec.study_file import Study
@@ -163,20 +163,18 @@ def one_for_all(cases: Sequence[Case]) -> bool:
     return cases[0].study.network.settings == "one"
 
 
-def choices(
-    cases: Sequence[Case], grid: Grid, trainings: Sequence[Training]
-) -> list[list[Chosen | None]]:
+def choices(cases: Sequence[Case], trainings: Sequence[Training]) -> list[list[Chosen | None]]:
     """Per group and terminal the best settings; None where the terminal is not judged."""
     if not one_for_all(cases):
         return [
             [
-                _choose(grid, [case], [training], t) if judged else None
+                _choose([case], [training], t) if judged else None
                 for t, judged in enumerate(case.judged)
             ]
             for case, training in zip(cases, trainings, strict=True)
         ]
     common = [
-        _choose(grid, cases, trainings, t) if any(case.judged[t] for case in cases) else None
+        _choose(cases, trainings, t) if any(case.judged[t] for case in cases) else None
         for t in range(len(cases[0].points.terminals))
     ]
     return [
@@ -185,11 +183,11 @@ def choices(
     ]
 
 
-def _choose(grid: Grid, cases: Sequence[Case], trainings: Sequence[Training], t: int) -> Chosen:
+def _choose(cases: Sequence[Case], trainings: Sequence[Training], t: int) -> Chosen:
     """The best setting of terminal ``t`` for all of these groups together."""
     sample = pool([_sample(*pair, t) for pair in zip(cases, trainings, strict=True)])
     window = common_window(cases, t)
-    study = cases[0].study
+    study, grid = cases[0].study, cases[0].grid
     reference = reference_settings(study)
     wanted = (reference.i_set_a, reference.v_set_pu, reference.z_set_ohm)
     margin = study.certificate.margin

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...optimise.staircase import Front, factors, nearest
 from ...optimise.thresholds import Choice, Obstacle, Refusal
 from ...optimise.windows import Window, loop_window, overlap, remedy
+from ..spec.parts import Study
 from .blocks import block_name
 from .cases import Case
 from .classes import REPORTED, DrawClass, Purpose
@@ -22,6 +23,7 @@ __all__ = [
     "load_side_status",
     "loop_note",
     "nearest_false_trip",
+    "refusal_in_brief",
     "refusal_text",
     "scenario_name",
     "status_of",
@@ -163,6 +165,16 @@ def refusal_text(groups: Sequence[Case], t: int, refusal: Refusal, front: Front)
     margin = groups[0].study.certificate.margin
     blocking = _blocking(margin, refusal, front)
     return f"no setting of {which} keeps the margin {margin:g} in training{blocking}. {advice}"
+
+
+def refusal_in_brief(study: Study, refusal: Choice | Refusal, limit: str = "") -> str | None:
+    """The same in a clause, for a setting within a ``limit``; None where there is a choice."""
+    if isinstance(refusal, Choice):
+        return None
+    if refusal.obstacle in (Obstacle.EMPTY_WINDOW, Obstacle.COARSE_DEVICE):
+        return "no Z_set keeps the closed loop's margins"
+    loop = " in the closed loop's window" if refusal.obstacle is Obstacle.WINDOW_MARGIN else ""
+    return f"no setting{limit}{loop} keeps the margin {study.certificate.margin:g}"
 
 
 def _blocking(margin: float, refusal: Refusal, front: Front) -> str:

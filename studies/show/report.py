@@ -45,6 +45,18 @@ STATUS = {
 }
 """Status -> what it means."""
 
+OF_A_SHEET = {
+    "none": "the sheet leaves the terminal without a setting",
+    "load_side": "cut off with its section, this terminal has no source behind it; whatever the "
+    "sheet sets it to, it did not trip falsely",
+}
+"""The same of an assessment, where it differs."""
+
+MARGIN = (
+    " Margin: factor by which I_set and Z_set could be lowered and V_set raised together before "
+    "the first false trip in training."
+)
+
 MARKS = (
     "Each mark is one event of the validation sample, by its positive sequence. Whatever is in "
     "full colour trips every setting to its lower left."
@@ -171,9 +183,10 @@ def _name(row: dict[str, Any], result: dict[str, Any]) -> str:
 def _head(result: dict[str, Any], study: Study) -> str:
     demand = study.certificate
     known = {"find": demand.find_at_least, "margin": demand.margin}
+    meanings = STATUS | (OF_A_SHEET if "assessed" in result else {})
     words = "\n".join(
         f"<dt>{status}</dt><dd>{escape(text.format(**known))}{_tally(result, status)}</dd>"
-        for status, text in STATUS.items()
+        for status, text in meanings.items()
     )
     assessed = result.get("assessed", {})
     note = f'<p class="bad">Note: {escape(assessed["note"])}.</p>\n' if assessed.get("note") else ""
@@ -219,8 +232,7 @@ def _sheet(result: dict[str, Any]) -> str:
         '<p class="faint">Dependability: breaks found, of those with something connected beyond '
         "them; the unreachable ones have nothing beyond, and change nothing to be measured. "
         "False trips: k of n events that must not trip. Bound: upper bound of the false-trip "
-        "probability per event, worst class. Margin: factor by which I_set and Z_set could be "
-        "lowered and V_set raised together before the first false trip in training.</p>"
+        f"probability per event, worst class.{'' if 'assessed' in result else MARGIN}</p>"
     )
 
 

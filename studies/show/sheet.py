@@ -83,7 +83,8 @@ def sheet_table(result: dict[str, Any]) -> str:
             lines += ["", title, *said]
     lines += _apart(rows)
     if {row["name"] for row in result["compared"]} - {"assessed"}:
-        lines += ["", *_comparison(result["compared"], several)]
+        for group, own in _by_group(result["compared"]):
+            lines += ["", *_group_head(group, rows), *_comparison(own)]
     return "\n".join(lines)
 
 
@@ -211,11 +212,11 @@ def _whole_percent(k: int, n: int) -> str:
     return f"{min(max(round(100 * k / n), 1), 99)} %"
 
 
-def _comparison(rows: list[dict[str, Any]], several: bool) -> list[str]:
+def _comparison(rows: list[dict[str, Any]]) -> list[str]:
     return table_lines(
         ("compared", "setting"),
         ("I_set A", "V_set %", "Z_set Ω", "found (interval)", "false trips", "bound"),
-        [_compared_row(row, several) for row in rows],
+        [_compared_row(row) for row in rows],
     )
 
 
@@ -275,8 +276,8 @@ def _setting_row(row: dict[str, Any]) -> Row:
     )
 
 
-def _compared_row(row: dict[str, Any], several: bool) -> Row:
-    keys = (row_name(row, several), row["name"].replace("reference V_set", "ref. V_set"))
+def _compared_row(row: dict[str, Any]) -> Row:
+    keys = (terminal_name(row), row["name"].replace("reference V_set", "ref. V_set"))
     if row["i_set_a"] is None:
         return keys, row["reason"]
     reachable = row["opens"] - row["unreachable"]

@@ -11,11 +11,12 @@ import pytest
 
 from openphase.model.reading.feeder_file import feeder_from_toml, load_feeder
 from openphase.optimise.staircase import border, front_of
+from openphase.studies.run.session import Demand
 from openphase.studies.run.store import RunFolder
 from openphase.studies.show import figures, plots, views
 from openphase.studies.show.feeder_layout import lay_out
 from openphase.studies.show.report import STATUS, report_html, write_report
-from openphase.studies.sizing import Demand, size_feeder
+from openphase.studies.sizing import size_feeder
 from openphase.studies.spec.study_file import default_study
 
 FORKED = """
@@ -104,16 +105,16 @@ def write(sizing, path, result=None):
     """Write the report of a sizing, or of another result of it; return the files' bytes."""
     path.mkdir()
     result = sizing.result if result is None else result
-    fronts, folder = sizing.training.front, RunFolder(path)
-    write_report(result, sizing.case, fronts, sizing.validation, folder)
+    fronts = [own.front for own in sizing.trainings]
+    write_report(result, sizing.cases, fronts, sizing.validations, RunFolder(path))
     return {file.name: file.read_bytes() for file in path.iterdir()}
 
 
 def all_views(sizing):
     """Each plot with its data, for everything that is drawn."""
-    case, validation = sizing.case, sizing.validation
+    case, validation = sizing.cases[0], sizing.validations[0]
     for t in judged(sizing):
-        row, front = sizing.result["sections"][t], sizing.training.front[t]
+        row, front = sizing.result["sections"][t], sizing.trainings[0].front[t]
         yield plots.plot_evidence, views.evidence_view(case, t, row, front, validation)
         yield plots.plot_profile, views.profile_view(case, t, validation)
     yield plots.plot_overview, views.overview_view(sizing.result)
@@ -172,7 +173,7 @@ def test_settings_are_printed_as_the_device_holds_them(sizing):
     for t in judged(sizing):
         stem = f"{t + 1:02d}-{result['sections'][t]['local']}-{result['sections'][t]['remote']}"
         names += [f"{stem}-evidence.png", f"{stem}-along-line.png"]
-    page = report_html(result, sizing.case.study, dict.fromkeys(names, b""))
+    page = report_html(result, sizing.cases[0].study, dict.fromkeys(names, b""))
     cells = '<td class="n">0.15</td><td class="n">0.25</td><td class="n">100.25</td>'
     assert page.count(cells) == len(rows)
     assert "I_set 0.15 A (0.0015 pu), V_set 0.25 %, Z_set 100.25 Ω" in page
@@ -193,7 +194,7 @@ def test_every_status_is_printed_and_explained(sizing, status):
     result["sections"] = result["sections"][:1]
     result["sections"][0] |= {"status": status, "reason": f"because of {status}", "classes": []}
     pictures = {"feeder.png": b"", "overview.png": b""}
-    page = report_html(result, sizing.case.study, pictures)
+    page = report_html(result, sizing.cases[0].study, pictures)
     assert f'<td class="w">{status}</td>' in page
     assert f"because of {status}" in page
     assert len(re.findall(rf"<dt>{status}</dt><dd>.*\(here: 1\)", page)) == 1
@@ -234,7 +235,7 @@ def test_an_interval_is_rounded_outwards(sizing):
     row = result["compared"][0]
     row |= {"dependability_low": 0.99996, "dependability_high": 0.999999}
     result["sections"] = []
-    page = report_html(result, sizing.case.study, {"feeder.png": b"", "overview.png": b""})
+    page = report_html(result, sizing.cases[0].study, {"feeder.png": b"", "overview.png": b""})
     assert "99.9 .. 100.0 %" in page
 
 
@@ -260,7 +261,7 @@ def freeze(value):
 
 def test_plots_do_not_write_into_what_they_draw(sizing):
     before = copy.deepcopy(sizing)
-    freeze((sizing.training.front, sizing.validation))
+    freeze((sizing.trainings[0].front, sizing.validations))
     for plot, view in all_views(sizing):
         freeze(view)
         plot(view)
@@ -301,7 +302,7 @@ def test_the_drawn_staircase_is_the_border(sizing):
     for own in (view.border, view.margin_border):
         wanted = np.maximum(np.column_stack(own), floor)
         assert any(np.array_equal(line, wanted) for line in drawn)
-    assert np.array_equal(view.border[0], border(sizing.training.front[t], view.v_set_pu)[0])
+    assert np.array_equal(view.border[0], border(sizing.trainings[0].front[t], view.v_set_pu)[0])
 
 
 @pytest.mark.parametrize("margin", [1.0, 1.25])
@@ -324,10 +325,10 @@ def test_the_border_parts_what_trips_from_what_does_not(margin):
 
 
 def test_blind_ends_and_tees_stand_where_the_feeder_has_them(sizing):
-    names = [terminal.name for terminal in sizing.case.points.terminals]
+    names = [terminal.name for terminal in sizing.cases[0].points.terminals]
 
     def profile(name):
-        return views.profile_view(sizing.case, names.index(name), sizing.validation)
+        return views.profile_view(sizing.cases[0], names.index(name), sizing.validations[0])
 
     third, back = profile("R3→R4"), profile("R4b→R5")
     assert third.tees == ((2.5, "T5"), (4.5, "T6"))
@@ -340,7 +341,7 @@ def test_blind_ends_and_tees_stand_where_the_feeder_has_them(sizing):
 
 def test_a_profile_adds_up_to_the_result(sizing):
     for t in judged(sizing):
-        view = views.profile_view(sizing.case, t, sizing.validation)
+        view = views.profile_view(sizing.cases[0], t, sizing.validations[0])
         row = sizing.result["sections"][t]
         assert view.breaks == row["opens"]
         assert row["detected"] <= view.found

@@ -12,17 +12,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from openphase.model import load_feeder
 from openphase.model.distributions import Uniform
 from openphase.model.errors import OpenPhaseError
 from openphase.model.reading.feeder_file import dump_feeder
+from openphase.optimise.certificate import upper_bound
 from openphase.studies import cli, sizing
 from openphase.studies.run import session
+from openphase.studies.run.classes import DrawClass
 from openphase.studies.run.digests import population_digest
 from openphase.studies.run.ledger import find_attempt, reserve
-from openphase.studies.spec.study_file import Group, NetworkState, default_study, dump_study
+from openphase.studies.spec.parts import Group, GroupSettings, NetworkState
+from openphase.studies.spec.study_file import Study, default_study, dump_study
 
 NOT_COMPARED = {"log.txt", "timing.json"}
 
@@ -57,9 +61,28 @@ def run(*words: object) -> Said:
     return Said(code, out.getvalue(), err.getvalue())
 
 
-def size(out: Path, *more: object, seed: int = 1) -> Said:
+KEPT = ("open_phase", "load_step", "source_step", "open_three")
+
+
+def lean_study(**changes: Any) -> Study:
+    """The paper's study with four classes of events, where more would only take time."""
+    study = default_study("paper")
+    without = tuple(own.name.lower() for own in DrawClass if own.name.lower() not in KEPT)
+    return replace(study, events=replace(study.events, without=without), **changes)
+
+
+LEAN: list[Path] = []  # the file of that study
+
+
+@pytest.fixture(scope="module", autouse=True)
+def lean(tmp_path_factory: pytest.TempPathFactory) -> None:
+    LEAN[:] = [tmp_path_factory.mktemp("study") / "lean.toml"]
+    LEAN[0].write_text(dump_study(lean_study()), encoding="utf-8")
+
+
+def size(out: Path, *more: object, seed: int = 1, study: Path | None = None) -> Said:
     words = ("size", "paper", "--scenarios", 400, "--seed", seed, "--json", "--out", out)
-    return run(*words, *(more or ("--jobs", 1)))
+    return run(*words, "--study", study or LEAN[0], *(more or ("--jobs", 1)))
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -173,7 +196,7 @@ def test_the_folder_holds_what_it_should(home: Path, first: Said) -> None:
     needed = {"study.toml", "manifest.json", "result.json", "settings.csv", "report.html"}
     assert needed | {"blocks"} | NOT_COMPARED <= names
     study = (home / "run" / "study.toml").read_text(encoding="utf-8")
-    assert study == dump_study(default_study("paper"))
+    assert study == dump_study(lean_study())
     with (home / "run" / "settings.csv").open(encoding="utf-8", newline="") as file:
         sheet = list(csv.DictReader(file))
     for row, line in zip(first.result["sections"], sheet, strict=True):
@@ -184,8 +207,10 @@ def test_the_folder_holds_what_it_should(home: Path, first: Said) -> None:
 
 
 @pytest.mark.usefixtures("plain")
-def test_the_table_fits_a_terminal(copy: Path) -> None:
-    said = run("size", "paper", "--scenarios", 400, "--seed", 1, "--jobs", 1, "--out", copy)
+def test_the_table_fits_a_terminal(tmp_path: Path) -> None:
+    """With every class of the study that ships."""
+    words = ("size", "paper", "--scenarios", 100, "--jobs", 1, "--out", tmp_path / "run")
+    said = run(*words)
     table = said.out.splitlines()[:-1]  # the last line names the folder, however long its path
     assert max(len(line) for line in table) <= 100
     assert "load_side" in said.out
@@ -194,7 +219,7 @@ def test_the_table_fits_a_terminal(copy: Path) -> None:
 @pytest.mark.usefixtures("plain")
 def test_a_lenient_study_is_answered_with_zero(tmp_path: Path) -> None:
     """With a bound of .05 a hundred scenarios do, and every section ends up set or weak."""
-    said = size(tmp_path / "run", "--jobs", 1, "--study", lenient(tmp_path), seed=2)
+    said = size(tmp_path / "run", seed=2, study=lenient(tmp_path))
     statuses = {row["status"] for row in said.result["sections"]}
     assert (said.code, "not_certified" in statuses) in ((0, False), (3, True))
     assert statuses & {"set", "weak"}
@@ -202,7 +227,7 @@ def test_a_lenient_study_is_answered_with_zero(tmp_path: Path) -> None:
 
 def lenient(folder: Path) -> Path:
     path = folder / "lenient.toml"
-    text = dump_study(default_study("paper"))
+    text = dump_study(lean_study())
     path.write_text(text.replace("target = 0.0001", "target = 0.05"), encoding="utf-8")
     return path
 
@@ -235,6 +260,117 @@ def test_a_section_needs_a_usable_terminal_in_every_group() -> None:
     assert session.exit_code({"sections": normal + tied}) == 0
     tied = rows_of("tied", "set", "set", "none", "none")
     assert session.exit_code({"sections": normal + tied}) == 3
+
+
+# --- setting groups ---------------------------------------------------------------------
+
+GROUPS = (
+    Group(name="normal", closed=()),
+    Group(name="tied", closed=("R4",)),
+    Group(name="backwards", closed=("R4",), opened=("R1",)),
+)
+
+
+def grouped(folder: Path, settings: GroupSettings) -> Path:
+    """A study of three network states."""
+    network = NetworkState(settings=settings)
+    path = folder / f"{settings}.toml"
+    study = lean_study(groups=GROUPS, network=network)
+    path.write_text(dump_study(study), encoding="utf-8")
+    return path
+
+
+def by_terminal(said: Said) -> dict[str, list[dict[str, Any]]]:
+    found: dict[str, list[dict[str, Any]]] = {}
+    for row in said.result["sections"]:
+        found.setdefault(f"{row['local']}→{row['remote']}", []).append(row)
+    return found
+
+
+@pytest.fixture(scope="module")
+def groups(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Said]:
+    """The same three states, with settings of their own and with one setting for all."""
+    folder = tmp_path_factory.mktemp("groups")
+    kinds: tuple[GroupSettings, ...] = ("each", "one")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sizing, "write_report", lambda *_: None)
+        return {kind: size(folder / kind, study=grouped(folder, kind)) for kind in kinds}
+
+
+def test_every_group_has_a_row_for_every_terminal(groups: dict[str, Said]) -> None:
+    for said in groups.values():
+        assert len(said.result["sections"]) == 24
+        for rows in by_terminal(said).values():
+            assert [row["setting_group"] for row in rows] == ["normal", "tied", "backwards"]
+
+
+def test_groups_share_alpha(groups: dict[str, Said]) -> None:
+    """4 + 8 + 4 terminals are judged in the three states; with one setting for all, 8 in each."""
+    for kind, pairs, attempt in (("each", 16, 1), ("one", 24, 2)):
+        for row in groups[kind].result["sections"]:
+            if row["i_set_a"] is None:
+                continue
+            alpha = 0.05 / 2**attempt / pairs
+            source = next(own for own in row["classes"] if own["name"] == "source_step")
+            bound = upper_bound(source["trips"], source["trials"], alpha)
+            assert source["upper"] == pytest.approx(bound)
+
+
+def test_each_group_is_the_study_of_that_state_alone(
+    groups: dict[str, Said], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first group draws what a study without groups draws, so it chooses the same."""
+    monkeypatch.setattr(sizing, "write_report", lambda *_: None)
+    alone = by_terminal(size(tmp_path / "run"))
+    same = ("status", "i_set_a", "v_set_pu", "z_set_ohm", "margin", "opens", "detected")
+    for name, rows in by_terminal(groups["each"]).items():
+        (own,) = alone[name]
+        assert [rows[0][key] for key in same] == [own[key] for key in same]
+
+
+def test_one_setting_for_all_is_the_same_in_every_group(groups: dict[str, Said]) -> None:
+    some = 0
+    for rows in by_terminal(groups["one"]).values():
+        settings = {(row["i_set_a"], row["v_set_pu"], row["z_set_ohm"]) for row in rows}
+        assert len(settings) == 1
+        some += None not in settings.pop()
+    assert some
+
+
+def test_a_loop_without_room_for_z_set_has_no_setting(groups: dict[str, Said]) -> None:
+    """R5→R4b: 1.3 of 3.26 Ω; 2 x 1.3 > 1.96 / 1.25. All others have a window."""
+    low, high = 2.0 * 0.85, (3.26 - 0.85) / 1.25
+    for name, rows in by_terminal(groups["each"]).items():
+        tied = rows[1]
+        if "R5" in name:
+            assert tied["status"] == "none"
+            assert "2 times the section's 1.3 Ω, that is 2.6 Ω" in tied["reason"]
+            assert "What would help: a section of at most 0.9 Ω" in tied["reason"]
+        elif name in ("R2→R3", "R3→R2") and tied["z_set_ohm"] is not None:
+            assert low <= tied["z_set_ohm"] <= high
+    missing = [
+        row
+        for row in groups["each"].result["compared"]
+        if (row["local"], row["setting_group"], row["name"]) == ("R5", "tied", "chosen")
+    ]
+    assert missing[0]["reason"] == "no Z_set keeps the closed loop's margins"
+
+
+def test_settings_and_counts_are_kept_per_row(groups: dict[str, Said], tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sizing, "write_report", lambda *_: None)
+        said = size(folder, study=grouped(tmp_path, "each"))
+    assert said.out == groups["each"].out
+    with (folder / "settings.csv").open(encoding="utf-8", newline="") as file:
+        sheet = list(csv.DictReader(file))
+    assert [row["setting_group"] for row in sheet] == [
+        row["setting_group"] for row in said.result["sections"]
+    ]
+    with np.load(folder / "counts.npz") as counts:
+        judged = {int(key.split(".")[0]) for key in counts.files if not key.startswith("grid")}
+    rows = enumerate(said.result["sections"])
+    assert judged == {n for n, row in rows if row["status"] != "load_side"}
 
 
 # --- the same bytes --------------------------------------------------------------------
