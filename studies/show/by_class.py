@@ -33,7 +33,8 @@ def at_a_glance(result: Row, target: float) -> str:
     counts = [f"{sum(row['status'] == own for row in rows)} {own}" for own in statuses]
     said = [f"Terminals: {', '.join(counts)}."]
     if judged:
-        said += [_false_trips(judged, target, several), _missed(judged, several)]
+        said.append(_false_trips(judged, target, several))
+        said += _missed(rows, several)
     return bullets(said)
 
 
@@ -60,20 +61,33 @@ def _false_trips(judged: Sequence[Row], target: float, several: bool) -> str:
     )
 
 
-def _missed(judged: Sequence[Row], several: bool) -> str:
-    """Breaks that terminals with settings miss, of those that can be seen."""
-    seen = [row for row in judged if row["opens"] > row["unreachable"]]
-    worst = sorted(seen, key=_missed_share, reverse=True)
+def _missed(rows: Sequence[Row], several: bool) -> list[str]:
+    """What sections miss: one end that finds a break is enough, so the better end speaks."""
+    ends: dict[tuple[str, frozenset[str]], list[Row]] = {}
+    for row in rows:
+        key = row["setting_group"], frozenset((row["local"], row["remote"]))
+        ends.setdefault(key, []).append(row)
+    better: list[Row] = []
+    without: list[str] = []
+    for pair in ends.values():
+        found = [row for row in pair if row["i_set_a"] is not None]
+        if not found:
+            without.append(row_name(pair[0], several))
+        elif found[0]["opens"] > found[0]["unreachable"]:
+            better.append(min(found, key=_missed_count))
+    bad = [row for row in sorted(better, key=_missed_share, reverse=True) if _missed_count(row)]
     named = [
         f"{row_name(row, several)} {k_of_n(_missed_count(row), row['opens'] - row['unreachable'])}"
-        for row in worst
-        if _missed_count(row)
+        for row in bad[:NAMED]
     ]
-    more = f" and {len(named) - NAMED} more" if len(named) > NAMED else ""
-    text = f"{', '.join(named[:NAMED])}{more}" if named else "none"
-    blind = sum(row["unreachable"] for row in judged)
-    beyond = f" {blind:,} more have nothing connected beyond and cannot be seen." if blind else ""
-    return f"Missed breaks, of those with something connected beyond: {text}.{beyond}"
+    more = f" and {len(bad) - NAMED} more sections" if len(bad) > NAMED else ""
+    said = [
+        "Missed breaks, by the better end of each section with settings, of those with something "
+        f"connected beyond: {', '.join(named) or 'none'}{more}."
+    ]
+    if without:
+        said.append(f"Sections without settings at either end: {', '.join(without)}.")
+    return said
 
 
 def _missed_count(row: Row) -> int:

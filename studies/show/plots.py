@@ -286,8 +286,9 @@ OVERVIEW = ((BLUE, ""), (SKY, ""), ("#bdbdbd", "///"))  #: colour and hatch of e
 @house_style()
 def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
     """Draw the dependability of the compared settings of every judged terminal."""
-    ax = axes_or_new(ax, 8.6, 1.5 + min(0.95 * len(view.terminals), TALLEST))
-    step = 0.27
+    row_height = 0.2 + 0.25 * len(view.names)
+    ax = axes_or_new(ax, 8.6, 1.5 + min(row_height * len(view.terminals), TALLEST))
+    step = 0.25 / row_height
     for t, bars in enumerate(view.bars):
         for n, bar in enumerate(bars):
             _draw_bar(ax, t + step * (n - (len(bars) - 1) / 2), bar, n, 0.9 * step)
@@ -302,7 +303,7 @@ def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
         Patch(facecolor=colour, edgecolor="white", hatch=hatch, label=name)
         for name, (colour, hatch) in zip(view.names, OVERVIEW, strict=False)
     ]
-    below = -0.55 / (0.95 * len(view.terminals))
+    below = -0.55 / (row_height * len(view.terminals))
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, below), ncols=3)
     return ax
 

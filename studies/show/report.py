@@ -70,8 +70,8 @@ th, td { padding: .3em .6em; border-bottom: 1px solid #ddd; text-align: left; ve
 thead th { border-bottom: 2px solid #888; }
 .n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .w { white-space: nowrap; }
-.sheet tbody tr:nth-child(odd) > * { border-bottom: none; padding-bottom: 0; }
-.sheet tbody tr:nth-child(even) > * { color: #555; }
+.sheet tr:has(+ tr > td:empty) > * { border-bottom: none; padding-bottom: 0; }
+.why { color: #555; }
 .bad { color: #a33b00; font-weight: bold; }
 .faint, figcaption, footer { color: #555; font-size: .85em; }
 figure { margin: 1em 0; break-inside: avoid; }
@@ -114,7 +114,7 @@ def write_report(
     from .plots import plot_evidence, plot_overview, plot_profile, png_of  # noqa: PLC0415
 
     pictures = {"feeder.png": png_of(plot_feeder, cases[0].feeder)}
-    if result["compared"]:
+    if _rivals(result):
         pictures["overview.png"] = png_of(plot_overview, overview_view(result))
     terminals = len(cases[0].points.terminals)
     for n, row in enumerate(result["sections"]):
@@ -203,43 +203,58 @@ def _tally(result: dict[str, Any], status: str) -> str:
 
 
 def _sheet(result: dict[str, Any]) -> str:
-    head = (
+    assessed = "assessed" in result  # nothing is known of its margins
+    head = [
         "terminal", "status", "#I_set A", "#V_set %", "#Z_set Ω", "#margin",
         "#dependability (interval)", "#unreachable", "#false trips", "#bound",
-    )  # fmt: skip
+    ]  # fmt: skip
+    if assessed:
+        head.remove("#margin")
+    wide = len(head) - 2
     rows = []
     for row in result["sections"]:
         cells = [
             f'<th class="w">{escape(_name(row, result))}</th>',
             f'<td class="w">{escape(row["status"])}</td>',
         ]
+        if row["i_set_a"] is None:
+            why = f'<td colspan="{wide}" class="why">{escape(row["reason"])}</td>'
+            rows.append("".join([*cells, why]))
+            continue
         cells += [
             setting_cell(row["i_set_a"]),
             setting_cell(row["v_set_pu"], 100.0),
             setting_cell(row["z_set_ohm"]),
-            right_cell("–" if "assessed" in result else margin_text(row)),
+            *([] if assessed else [right_cell(margin_text(row))]),
             right_cell(dependability_text(row)),
             right_cell(k_of_n(row["unreachable"], row["opens"])),
             false_trips_cell(row["false_trips"], row["security_trials"]),
             right_cell(bound_text(row["false_trip_upper"])),
         ]
-        rows += ["".join(cells), f'<td></td><td colspan="9">{escape(row["reason"])}</td>']
+        why = f'<td colspan="{wide + 1}" class="why">{escape(row["reason"])}</td>'
+        rows += ["".join(cells), f"<td></td>{why}"]
     return table(head, rows, "sheet") + (
         '<p class="faint">Dependability: breaks found, of those with something connected beyond '
         "them; the unreachable ones have nothing beyond, and change nothing to be measured. "
         "False trips: k of n events that must not trip. Bound: upper bound of the false-trip "
-        f"probability per event, worst class.{'' if 'assessed' in result else MARGIN}</p>"
+        f"probability per event, worst class.{'' if assessed else MARGIN}</p>"
     )
 
 
+def _rivals(result: dict[str, Any]) -> tuple[str, ...]:
+    """The settings side by side; none where there is but one, of which the sheet says it all."""
+    names = tuple(dict.fromkeys(row["name"] for row in result["compared"]))
+    return names if len(names) > 1 else ()
+
+
 def _comparison(result: dict[str, Any], pictures: dict[str, bytes]) -> str:
-    if not result["compared"]:
+    names = _rivals(result)
+    if not names:
         return ""
     head = (
         "terminal", "setting", "#I_set A", "#V_set %", "#Z_set Ω", "#found", "#interval",
         "#false trips", "#bound",
     )  # fmt: skip
-    names = dict.fromkeys(row["name"] for row in result["compared"])
     rows = []
     for row in result["compared"]:
         cells = [
