@@ -80,7 +80,7 @@ def _missed(rows: Sequence[Row], several: bool) -> list[str]:
         f"{row_name(row, several)} {k_of_n(_missed_count(row), row['opens'] - row['unreachable'])}"
         for row in bad[:NAMED]
     ]
-    more = f" and {len(bad) - NAMED} more sections" if len(bad) > NAMED else ""
+    more = f" and {len(bad) - NAMED} more" if len(bad) > NAMED else ""
     said = [
         "Missed breaks, by the better end of each section with settings, of those with something "
         f"connected beyond: {', '.join(named) or 'none'}{more}."
@@ -121,15 +121,16 @@ def worst_first(classes: Iterable[Row]) -> list[Row]:
 
 def by_class(result: Row) -> str:
     """Three tables over all terminals with settings, for each setting group."""
-    rows = [row for row in result["sections"] if row["i_set_a"] is not None]
-    if not rows:
-        return ""
-    groups = dict.fromkeys(row["setting_group"] for row in rows)
+    rows = result["sections"]
     parts = ["<h2>By class of events</h2>"]
-    for group in groups:
-        own = [row for row in rows if row["setting_group"] == group]
-        head = f"<h3>Setting group {escape(group)}</h3>" if several_groups(result) else ""
-        parts += [head, _false_table(own), _missed_table(own), _apart_table(own)]
+    for group in dict.fromkeys(row["setting_group"] for row in rows):
+        if several_groups(result):
+            parts.append(f"<h3>Setting group {escape(group)}</h3>")
+        here = [row for row in rows if row["setting_group"] == group]
+        if own := [row for row in here if row["i_set_a"] is not None]:
+            parts += [_false_table(own), _missed_table(own), _apart_table(own)]
+        else:
+            parts.append("<p>No terminal has settings.</p>")
     return "\n".join(parts)
 
 

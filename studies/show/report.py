@@ -27,7 +27,7 @@ from .html_parts import (
     setting_cell,
     table,
 )
-from .sheet import row_name
+from .sheet import row_name, terminal_name
 from .terminal_part import picture_names, terminal_part
 from .views import evidence_view, overview_view, profile_view
 
@@ -72,6 +72,7 @@ thead th { border-bottom: 2px solid #888; }
 .w { white-space: nowrap; }
 .sheet tr:has(+ tr > td:empty) > * { border-bottom: none; padding-bottom: 0; }
 .why { color: #555; }
+.group { background: #f2f2f2; }
 .bad { color: #a33b00; font-weight: bold; }
 .faint, figcaption, footer { color: #555; font-size: .85em; }
 figure { margin: 1em 0; break-inside: avoid; }
@@ -211,10 +212,15 @@ def _sheet(result: dict[str, Any]) -> str:
     if assessed:
         head.remove("#margin")
     wide = len(head) - 2
-    rows = []
+    rows: list[str] = []
+    group = None
     for row in result["sections"]:
+        if several_groups(result) and row["setting_group"] != group:
+            group = row["setting_group"]
+            text = f"Setting group {escape(group)}"
+            rows.append(f'<th colspan="{len(head)}" class="group">{text}</th>')
         cells = [
-            f'<th class="w">{escape(_name(row, result))}</th>',
+            f'<th class="w">{escape(terminal_name(row))}</th>',
             f'<td class="w">{escape(row["status"])}</td>',
         ]
         if row["i_set_a"] is None:
