@@ -15,22 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..detector.criteria import Settings
 from ..model.errors import Fault, InputError
 from ..model.parts import Feeder
 from .run.cases import Case, make_cases
-from .run.certify import (
-    Given,
-    Rival,
-    Sheet,
-    Validation,
-    alpha_of,
-    compared_rows,
-    not_covered,
-    numerics,
-    section_row,
-)
+from .run.certify import Given, Rival, Validation, certified, sheets_of
 from .run.choose import reference_settings
 from .run.classes import Purpose
 from .run.digests import digest, manifest, population_digest
@@ -41,6 +30,7 @@ from .run.session import (
     Demand,
     Watch,
     announce,
+    answer_head,
     default_scenarios,
     exit_code,
     read_feeder,
@@ -136,51 +126,18 @@ def assess_feeder(
     watch = Watch()
     beside = sheet is not None
     rivals = [[_rivals(study, own, beside) for own in group] for group in given]
-    validations = tuple(
-        validate(
-            case,
-            tuple(tuple(rival.settings for rival in own) for own in group),
-            attempt,
-            folder,
-            demand.jobs,
-        )
-        for case, group in zip(cases, rivals, strict=True)
-    )
+    validations = validate(cases, rivals, attempt, folder, demand.jobs)
     watch.lap("validate_s")
-    sheets = [
-        Sheet(
-            case=case,
-            validation=own,
-            alpha=alpha_of(cases, attempt.number),
-            attempt=attempt.number,
-            chosen=False,
-        )
-        for case, own in zip(cases, validations, strict=True)
+    rows = [
+        [_given(case, t, own) for t, own in enumerate(group)]
+        for case, group in zip(cases, given, strict=True)
     ]
-    answer = {
-        "version": __version__,
-        "seed": demand.seed,
-        "feeder": feeder.name,
-        "study_hash": digest(dump_study(study)),
-        "confidence": study.certificate.confidence,
-        "attempt": attempt.number,
-        "scenarios": attempt.scenarios,
-        "assessed": _assessed(sheet, given, attempt),
-        "sections": [
-            section_row(own, t, _given(own.case, t, settings))
-            for own, group in zip(sheets, given, strict=True)
-            for t, settings in enumerate(group)
-        ],
-        "compared": [
-            row
-            for own, group in zip(sheets, rivals, strict=True)
-            for t, rival in enumerate(group)
-            if own.case.judged[t] or rival[0].settings
-            for row in compared_rows(own, t, rival)
-        ],
-        "feeder_false_trips": {"per_year_upper": None, "assumptions": not_covered(validations)},
-        "numerics": numerics(validations),
-    }
+    sheets = sheets_of(cases, validations, attempt.number, chosen=False)
+    answer = (
+        answer_head(cases, attempt)
+        | {"assessed": _assessed(sheet, given, attempt)}
+        | certified(sheets, rows, rivals)
+    )
     folder.write("result.json", as_json(answer))
     folder.write("settings.csv", settings_csv(answer))
     write_report(answer, cases, None, validations, folder)
@@ -281,7 +238,7 @@ def _origin(folder: Path, sheet: SettingsSheet, attempt: Attempt) -> dict[str, A
             "seed": made_from["seed"],
             "attempt": made_from["attempt"],
             "same_draws": drawn == (attempt.population, attempt.seed, attempt.number),
-            "edited": _sheet_values(sheet) != _result_values(result),
+            "edited": _sheet_values(sheet, result) != _result_values(result),
         }
     except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError):
         return None  # no run of this package
@@ -290,9 +247,12 @@ def _origin(folder: Path, sheet: SettingsSheet, attempt: Attempt) -> dict[str, A
 Values = dict[tuple[str, str, str], tuple[object, ...] | None]
 
 
-def _sheet_values(sheet: SettingsSheet) -> Values:
+def _sheet_values(sheet: SettingsSheet, result: dict[str, Any]) -> Values:
+    """What the sheet says; one without groups speaks of the result's only one."""
+    names = {row["setting_group"] for row in result["sections"]}
+    only = names.pop() if len(names) == 1 else ""
     return {
-        (group, *pair): None
+        (group or only, *pair): None
         if own is None
         else (
             *(own.i_set_a, own.v_set_pu, own.z_set_ohm),

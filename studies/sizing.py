@@ -9,22 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..model.parts import Feeder
 from ..optimise.thresholds import Refusal
 from .run.blocks import run_blocks
 from .run.cases import Case, make_cases
-from .run.certify import (
-    Given,
-    Rival,
-    Sheet,
-    Validation,
-    alpha_of,
-    compared_rows,
-    not_covered,
-    numerics,
-    section_row,
-)
+from .run.certify import Given, Rival, Validation, certified, sheets_of
 from .run.choose import Chosen, Training, as_settings, choices, gather, reference_settings
 from .run.classes import Purpose
 from .run.digests import digest, manifest, population_digest
@@ -34,6 +23,7 @@ from .run.session import (
     Demand,
     Watch,
     announce,
+    answer_head,
     default_scenarios,
     exit_code,
     read_feeder,
@@ -95,30 +85,13 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     chosen = choices(cases, trainings)
     watch.lap("choose_s")
     rivals = [
-        [_rivals(case, t, own) for t, own in enumerate(own_group)]
-        for case, own_group in zip(cases, chosen, strict=True)
+        [_rivals(case, own) for own in group] for case, group in zip(cases, chosen, strict=True)
     ]
-    validations = tuple(
-        validate(
-            case,
-            tuple(tuple(rival.settings for rival in own) for own in group),
-            attempt,
-            folder,
-            demand.jobs,
-        )
-        for case, group in zip(cases, rivals, strict=True)
-    )
+    given = [[_given(study, t, own, attempt) for t, own in enumerate(group)] for group in chosen]
+    validations = validate(cases, rivals, attempt, folder, demand.jobs)
     watch.lap("validate_s")
-    answer = {
-        "version": __version__,
-        "seed": demand.seed,
-        "feeder": feeder.name,
-        "study_hash": digest(dump_study(study)),
-        "confidence": study.certificate.confidence,
-        "attempt": attempt.number,
-        "scenarios": attempt.scenarios,
-        **_certified(cases, chosen, rivals, validations, attempt),
-    }
+    sheets = sheets_of(cases, validations, attempt.number, chosen=True)
+    answer = answer_head(cases, attempt) | certified(sheets, given, rivals)
     sizing = Sizing(result=answer, cases=cases, trainings=trainings, validations=validations)
     folder.write("result.json", as_json(answer))
     folder.write("settings.csv", settings_csv(answer))
@@ -161,8 +134,7 @@ def _train(case: Case, attempt: Attempt, folder: RunFolder, jobs: int) -> Traini
         title = f"training, {case.group.name}"
         return gather(own for _, own in run_blocks(compute, Trained, wanted, folder, jobs, title))
 
-    training: Training = run_until_enough(case, Purpose.TRAIN, attempt, run)
-    return training
+    return run_until_enough(case, Purpose.TRAIN, attempt, run)
 
 
 def _counts(cases: Sequence[Case], trainings: Sequence[Training]) -> bytes:
@@ -179,7 +151,7 @@ def _counts(cases: Sequence[Case], trainings: Sequence[Training]) -> bytes:
 # ---- the rows of the result ----
 
 
-def _rivals(case: Case, t: int, chosen: Chosen | None) -> tuple[Rival, ...]:
+def _rivals(case: Case, chosen: Chosen | None) -> tuple[Rival, ...]:
     """The settings of a terminal that are judged side by side, the chosen one first."""
     study = case.study
     if chosen is None:
@@ -203,7 +175,7 @@ def _rivals(case: Case, t: int, chosen: Chosen | None) -> tuple[Rival, ...]:
     )
 
 
-def _given(case: Case, t: int, chosen: Chosen | None, attempt: int) -> Given:
+def _given(study: Study, t: int, chosen: Chosen | None, attempt: Attempt) -> Given:
     """The chosen setting with what training says of it, or why there is none."""
     if chosen is None:
         return Given(settings=None)
@@ -211,43 +183,7 @@ def _given(case: Case, t: int, chosen: Chosen | None, attempt: int) -> Given:
     if isinstance(best, Refusal):
         return Given(settings=None, missing=refusal_text(chosen.groups, t, best, chosen.front))
     return Given(
-        settings=as_settings(case.study, best),
+        settings=as_settings(study, best),
         margin=best.margin,
-        nearest=nearest_false_trip(best, chosen.front, attempt),
+        nearest=nearest_false_trip(best, chosen.front, attempt.number),
     )
-
-
-def _certified(
-    cases: Sequence[Case],
-    chosen: Sequence[Sequence[Chosen | None]],
-    rivals: Sequence[Sequence[tuple[Rival, ...]]],
-    validations: Sequence[Validation],
-    attempt: Attempt,
-) -> dict[str, Any]:
-    """The part of the answer that rests on the two samples."""
-    sheets = [
-        Sheet(
-            case=case,
-            validation=own,
-            alpha=alpha_of(cases, attempt.number),
-            attempt=attempt.number,
-            chosen=True,
-        )
-        for case, own in zip(cases, validations, strict=True)
-    ]
-    return {
-        "sections": [
-            section_row(sheet, t, _given(sheet.case, t, own, attempt.number))
-            for sheet, group in zip(sheets, chosen, strict=True)
-            for t, own in enumerate(group)
-        ],
-        "compared": [
-            row
-            for sheet, group in zip(sheets, rivals, strict=True)
-            for t, own in enumerate(group)
-            if sheet.case.judged[t]
-            for row in compared_rows(sheet, t, own)
-        ],
-        "feeder_false_trips": {"per_year_upper": None, "assumptions": not_covered(validations)},
-        "numerics": numerics(validations),
-    }

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from openphase.model import read_feeder
-from openphase.studies.cli import main
+from openphase.studies.cli import VERBS, build_parser, main
 from openphase.studies.spec.study_file import check_study, read_study
 
 ROOT = Path(__file__).parents[1]
@@ -97,8 +97,58 @@ def test_targets_are_seen_where_they_are_named() -> None:
     assert "VENV" not in made_targets()
 
 
-@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
-def test_files_named_in_backquotes_exist(page: str) -> None:
-    text = (ROOT / page).read_text(encoding="utf-8")
-    named = re.findall(r"`((?:docs|tests|model|detector|optimise|studies)/[\w./-]+)`", text)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_files_named_in_backquotes_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    named = re.findall(
+        r"`((?:docs|tests|model|detector|optimise|studies|benchmarks)/[\w./-]+)`", text
+    )
     assert [name for name in named if "NNNN" not in name and not (ROOT / name).exists()] == []
+
+
+# ---- commands ----
+
+#: what stands for something in a command, and something that it may stand for
+PLACEHOLDERS = {"N": "1", "S": "1", "J": "1"}
+
+
+def named_commands(text: str) -> list[str]:
+    """The ``openphase VERB …`` of a page, in backquotes or on indented or fenced lines."""
+    inline = re.findall(r"`(?:\.venv/bin/)?(openphase [a-z][^`]*)`", text)
+    lines = re.findall(r"^ *(?:\.venv/bin/)?(openphase [a-z].*)$", text, flags=re.MULTILINE)
+    indented = [line for line in lines if "`" not in line]
+    return [" ".join(command.partition("#")[0].split()) for command in inline + indented]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_command_can_be_typed(page: Path) -> None:
+    parser = build_parser()
+    for command in named_commands(page.read_text(encoding="utf-8")):
+        words = [PLACEHOLDERS.get(word, word) for word in command.split()[1:]]
+        if len(words) > 1:  # a verb alone is spoken of, not typed
+            assert parser.parse_args(words).verb == words[0], command
+
+
+def test_commands_are_seen_where_they_stand() -> None:
+    text = (
+        "`openphase size x` and `.venv/bin/openphase check y`\n\n    openphase paper --json # so\n"
+    )
+    assert named_commands(text) == [
+        "openphase size x",
+        "openphase check y",
+        "openphase paper --json",
+    ]
+    assert named_commands((DOCS / "results.md").read_text(encoding="utf-8"))
+
+
+def test_the_readme_has_a_row_for_every_verb() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    told = re.findall(r"^\| `([a-z]+)[^|]*\|", text, flags=re.MULTILINE)
+    assert told == [verb for group in VERBS.values() for verb in group]
+
+
+def test_decisions_are_numbered_without_gaps() -> None:
+    pages = sorted((DOCS / "decisions").glob("*.md"))
+    assert [page.name[:4] for page in pages] == [f"{n:04}" for n in range(1, len(pages) + 1)]
+    for page in pages:
+        assert page.read_text(encoding="utf-8").startswith(f"# {page.name[:4]}: ")

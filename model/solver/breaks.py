@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from .matrix3 import IDENTITY, ZERO, reciprocal, store, store_vector
 
-__all__ = ["DEAD", "FLOATING", "UNDEFINED", "open_phases", "squared"]
+__all__ = ["DEAD", "FLOATING", "NOTHING_S", "SINGULAR", "UNDEFINED", "open_phases", "squared"]
 
 Complex = NDArray[np.complex128]
 
@@ -26,6 +26,7 @@ FLOATING = 2  #: an opened conductor's far side has equipment, but no way to ear
 UNDEFINED = 8  #: times 2^a: phase a has no voltage of its own beyond the break
 
 SINGULAR = 1e-9  #: a driving-point admittance below this share of max|W| counts as zero
+NOTHING_S = 1e-12  #: and so does one below this, which idle windings leave of rounding
 
 
 @compiled
@@ -46,7 +47,7 @@ def open_phases(mask: int, here: Complex, here_j: Complex) -> int:
     for i in range(3):
         for j in range(3):
             largest = max(largest, squared(w[i, j]))
-    limit = SINGULAR**2 * largest
+    limit = max(SINGULAR**2 * largest, NOTHING_S**2)
     empty = 0
     for i in range(3):
         if max(squared(w[i, 0]), squared(w[i, 1]), squared(w[i, 2])) <= limit:

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from .assemble import set_admittances
-from .breaks import FLOATING, SINGULAR, squared
+from .breaks import FLOATING, NOTHING_S, SINGULAR, squared
 from .event_node import climb_event, cross, descend_event
 from .matrix3 import (
     ZERO,
@@ -198,7 +198,7 @@ def lift_neutral(tree: Tree, work: Work) -> int:
     largest = 0.0
     for i in range(9):
         largest = max(largest, squared(w[i]))
-    if squared(total) <= SINGULAR**2 * largest:
+    if squared(total) <= max(SINGULAR**2 * largest, NOTHING_S**2):
         return FLOATING
     shift = -(current[0] + current[1] + current[2]) * reciprocal(total)
     store_vector(work.v, last, plus(emf, (shift, shift, shift)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from ...detector.criteria import Reason, Settings
 from ...optimise.certificate import share_of_alpha, two_sided, upper_bound
-from ...optimise.staircase import Front, merge_fronts
 from .cases import Case
 from .classes import REPORTED, DrawClass
-from .draw import BlockId
 from .engine import options_of
 from .options import options_text, trigger_text
 from .status import load_side_status, status_of
-from .tally import Tested
+from .validation import Validation, add_up
 
 __all__ = [
     "Given",
@@ -28,11 +26,13 @@ __all__ = [
     "Validation",
     "add_up",
     "alpha_of",
+    "certified",
     "compared_rows",
     "judged_pairs",
     "not_covered",
     "numerics",
     "section_row",
+    "sheets_of",
 ]
 
 #: what no certificate of this version covers
@@ -53,53 +53,6 @@ MUST_TRIP = next(r for r, own in enumerate(REPORTED) if own.kind == "must_trip")
 MUST_NOT = [r for r, own in enumerate(REPORTED) if own.kind == "must_not_trip"]
 
 
-# ---- adding up blocks ----
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Validation:
-    """All validation blocks of one group together."""
-
-    trials: NDArray[np.int64]  #: (R, T)
-    effective: NDArray[np.int64]  #: (R, T)
-    trips: NDArray[np.int64]  #: (K, R, T)
-    alarms: NDArray[np.int64]  #: (R, T)
-    reachable: NDArray[np.int64]  #: (T,)
-    found: NDArray[np.int64]  #: (K, T)
-    missed: NDArray[np.int64]  #: (T, Reason)
-    profile: NDArray[np.int64]  #: (T, PLACES, 2)
-    front: tuple[Front, ...]
-    flags: NDArray[np.int64]  #: (3,)
-    scenarios: int
-    samples: tuple[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]], ...]  #: for pictures
-
-
-#: what simply adds up over blocks
-ADDED = (
-    *("trials", "effective", "trips", "alarms", "reachable"),
-    *("found", "missed", "profile", "flags"),
-)
-
-SAMPLED_BLOCKS = 25  #: blocks of a class whose kept evidence goes into pictures
-
-
-def add_up(blocks: Iterable[tuple[BlockId, Tested]], size: int) -> Validation:
-    """Add blocks of ``size`` scenarios; memory does not grow with their number."""
-    total: dict[str, Any] = {}
-    front: tuple[Front, ...] = ()
-    samples: list[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]]] = []
-    count = 0
-    for which, block in blocks:
-        count += size
-        for name in ADDED:
-            total[name] = total.get(name, 0) + getattr(block, name)
-        pairs = zip(front, block.front, strict=True) if front else ()
-        front = tuple(merge_fronts(list(pair)) for pair in pairs) or block.front
-        if which.block < SAMPLED_BLOCKS:
-            samples.append((which, block.sample, block.sample_side))
-    return Validation(front=front, scenarios=count, samples=tuple(samples), **total)
-
-
 # ---- who shares the error probability ----
 
 
@@ -112,6 +65,22 @@ def alpha_of(cases: Sequence[Case], attempt: int) -> float:
     """Error probability of each bound."""
     confidence = cases[0].study.certificate.confidence
     return share_of_alpha(confidence, attempt, judged_pairs(cases))
+
+
+def sheets_of(
+    cases: Sequence[Case], validations: Sequence[Validation], attempt: int, chosen: bool
+) -> list[Sheet]:
+    """A sheet for each group; the settings were ``chosen`` for this validation, or given."""
+    return [
+        Sheet(
+            case=case,
+            validation=own,
+            alpha=alpha_of(cases, attempt),
+            attempt=attempt,
+            chosen=chosen,
+        )
+        for case, own in zip(cases, validations, strict=True)
+    ]
 
 
 def not_covered(validations: Sequence[Validation]) -> list[str]:
@@ -322,3 +291,35 @@ def compared_rows(sheet: Sheet, t: int, rivals: Sequence[Rival]) -> list[dict[st
             }
         )
     return rows
+
+
+# ---- the part of an answer that rests on validation ----
+
+
+def certified(
+    sheets: Sequence[Sheet],
+    given: Sequence[Sequence[Given]],
+    rivals: Sequence[Sequence[Sequence[Rival]]],
+) -> dict[str, Any]:
+    """Rows of all groups and terminals, and what the bounds do not cover.
+
+    ``given`` and ``rivals`` run over groups and terminals; a terminal's first rival is what
+    is given.
+    """
+    validations = [sheet.validation for sheet in sheets]
+    return {
+        "sections": [
+            section_row(sheet, t, own)
+            for sheet, group in zip(sheets, given, strict=True)
+            for t, own in enumerate(group)
+        ],
+        "compared": [
+            row
+            for sheet, group in zip(sheets, rivals, strict=True)
+            for t, own in enumerate(group)
+            if sheet.case.judged[t] or own[0].settings is not None
+            for row in compared_rows(sheet, t, own)
+        ],
+        "feeder_false_trips": {"per_year_upper": None, "assumptions": not_covered(validations)},
+        "numerics": numerics(validations),
+    }

@@ -51,6 +51,8 @@ def planned_blocks(case: Case, purpose: Purpose, attempt: Attempt) -> list[Block
     """Blocks that most likely give every class, side and judged terminal its trials."""
     n, blocks = attempt.scenarios, []
     for drawn in case.drawn:
+        if purpose == Purpose.TRAIN and not any(REPORTED[r].drawn == drawn for r in BOUNDED):
+            continue  # told apart wherever it stands: no setting depends on it
         share = _smallest_share(case, drawn)
         draws = n / share + 4.0 * math.sqrt(n * (1.0 - share)) / share
         blocks += _blocks(case, purpose, attempt, drawn, range(math.ceil(draws / BLOCK)))

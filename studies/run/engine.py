@@ -13,7 +13,7 @@ from ...detector.instruments import Bounds, measure, miswire
 from ...detector.supervision import fed_one_way, wiring_alarm
 from ...model.machines import carried_over
 from ...model.network import Network
-from ...model.points import into_line, point_probes
+from ...model.points import Side, into_line, point_probes
 from ...model.solve import solve, steady_state
 from ...model.states import Answer, State
 from ..spec.study_file import Study
@@ -113,12 +113,23 @@ def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
     edge = event.edge
     return Observed(
         evidence=with_alarm(evidence, wiring_alarm(phasors, terminals, v_nominal_v, one_way)),
-        side=event_sides(case, event),
+        side=_sides(case, scenarios),
         connected=case.network.equipped[edge] & (edge >= 0),
         edge=edge,
         share=event.share,
         flags=before.flags | after.flags,
     )
+
+
+def _sides(case: Case, scenarios: Scenarios) -> NDArray[np.int8]:
+    """(T, S): where each event stands; of wrong wiring, whether it is at an own point."""
+    side = event_sides(case, scenarios.event)
+    point, kind = scenarios.miswired
+    if not kind.any():
+        return side
+    own = np.array([(t.local_point, t.remote_point) for t in case.points.terminals])
+    mine = (own[:, :, None] == point).any(axis=1)
+    return np.where(kind > 0, np.where(mine, Side.PATH, Side.OTHER), side).astype(np.int8)
 
 
 def _into(wired: Wired, answer: Answer) -> NDArray[np.complex128]:

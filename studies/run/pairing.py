@@ -89,6 +89,9 @@ def differences(a: Run, b: Run) -> list[Fault]:
     ours, theirs = ([_terminal(row) for row in run.result["sections"]] for run in (a, b))
     if ours != theirs:
         faults.append(_fault(b, "terminals", f"must be as in {a.path}", ", ".join(theirs)))
+    drawn, other = (", ".join(sorted(_classes(run))) for run in (a, b))
+    if drawn != other:
+        return [*faults, _fault(b, "classes drawn", f"must be as in {a.path}, {drawn}", other)]
     missing = sorted(set(a.blocks) ^ set(b.blocks))
     if missing or not a.blocks:
         where = f"blocks/{missing[0]}.npz" if missing else "blocks"
@@ -99,6 +102,12 @@ def differences(a: Run, b: Run) -> list[Fault]:
 
 def _terminal(row: dict[str, Any]) -> str:
     return f"{row['local']}→{row['remote']} ({row['setting_group']})"
+
+
+def _classes(run: Run) -> set[str]:
+    """Names of the classes that a run has blocks of; a study may leave some out."""
+    matches = (BLOCK_NAME.fullmatch(name) for name in run.blocks)
+    return {match["drawn"] for match in matches if match is not None}
 
 
 def _fault(run: Run, where: str, wanted: str, found: object = None) -> Fault:

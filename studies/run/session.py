@@ -9,9 +9,12 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
-from ...detector.criteria import Settings
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import __version__
 from ...model.errors import InputError, OpenPhaseError
 from ...model.parts import Feeder
 from ...model.reading.feeder_file import load_feeder
@@ -21,7 +24,7 @@ from ...optimise.certificate import needed_trials, share_of_alpha
 from ..spec.study_file import Study, check_study, default_study, read_study
 from .blocks import run_blocks
 from .cases import Case
-from .certify import Validation, add_up, judged_pairs
+from .certify import Rival, Validation, add_up, judged_pairs
 from .choose import more_blocks, planned_blocks
 from .classes import Purpose
 from .draw import BlockId
@@ -35,10 +38,12 @@ __all__ = [
     "Demand",
     "Watch",
     "announce",
+    "answer_head",
     "default_scenarios",
     "exit_code",
     "read_feeder",
     "read_own_study",
+    "run_until_enough",
     "say",
     "validate",
 ]
@@ -156,15 +161,23 @@ def _span(seconds: float) -> str:
 # ---- the run ----
 
 
+class Counted(Protocol):
+    """What blocks add up to."""
+
+    @property
+    def trials(self) -> NDArray[np.int64]:
+        """(R, T) per reported class."""
+
+
+C = TypeVar("C", bound=Counted)
+
+
 def run_until_enough(
-    case: Case,
-    purpose: Purpose,
-    attempt: Attempt,
-    run: Callable[[list[BlockId]], Any],
-) -> Any:
+    case: Case, purpose: Purpose, attempt: Attempt, run: Callable[[list[BlockId]], C]
+) -> C:
     """Run the planned blocks, and more until every judged class has its trials.
 
-    ``run`` turns blocks into something with ``trials``; stored blocks cost it nothing.
+    ``run`` adds blocks up; those that are stored cost it little.
     """
     blocks = planned_blocks(case, purpose, attempt)
     found = run(blocks)
@@ -175,27 +188,53 @@ def run_until_enough(
 
 
 def validate(
+    cases: Sequence[Case],
+    rivals: Sequence[Sequence[Sequence[Rival]]],
+    attempt: Attempt,
+    folder: RunFolder,
+    jobs: int,
+) -> tuple[Validation, ...]:
+    """Judge settings on the untouched sample of every group.
+
+    ``rivals`` are those that are judged side by side, by group and terminal.
+    """
+    return tuple(
+        _validate(case, group, attempt, folder, jobs)
+        for case, group in zip(cases, rivals, strict=True)
+    )
+
+
+def _validate(
     case: Case,
-    settings: tuple[tuple[Settings | None, ...], ...],
+    rivals: Sequence[Sequence[Rival]],
     attempt: Attempt,
     folder: RunFolder,
     jobs: int,
 ) -> Validation:
-    """Judge settings on the untouched sample of one group.
-
-    ``settings[t]`` are those of terminal t that are judged side by side, its own first.
-    """
+    settings = tuple(tuple(rival.settings for rival in own) for own in rivals)
     compute = functools.partial(judge_block, case, settings=settings)
 
     def run(wanted: list[BlockId]) -> Validation:
         title = f"validation, {case.group.name}"
         return add_up(run_blocks(compute, Tested, wanted, folder, jobs, title), BLOCK)
 
-    found: Validation = run_until_enough(case, Purpose.VALIDATE, attempt, run)
-    return found
+    return run_until_enough(case, Purpose.VALIDATE, attempt, run)
 
 
 # ---- after it ----
+
+
+def answer_head(cases: Sequence[Case], attempt: Attempt) -> dict[str, Any]:
+    """What every answer begins with."""
+    return {
+        "version": __version__,
+        "seed": attempt.seed,
+        "feeder": cases[0].feeder.name,
+        "study_hash": attempt.study,
+        "confidence": cases[0].study.certificate.confidence,
+        "attempt": attempt.number,
+        "scenarios": attempt.scenarios,
+    }
 
 
 def exit_code(result: dict[str, Any]) -> int:

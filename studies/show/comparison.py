@@ -10,7 +10,7 @@ from .sheet import Row, class_words, row_name, setting_text, table_lines, wrappe
 
 __all__ = ["comparison_text"]
 
-MOST_CLASSES = 12  #: classes listed per terminal; all are in the JSON
+MOST_CLASSES = 6  #: classes listed per terminal; all are in the JSON
 
 
 def comparison_text(result: dict[str, Any]) -> str:
@@ -116,13 +116,15 @@ def _classes(named: Named) -> str:
     if not bad:
         return ""
     bad.sort(key=lambda own: -(own["both"] + own["only_a"] + own["only_b"]) / own["trials"])
-    said = [
-        f"{class_words(own)} {own['both']} both, {own['only_a']} only A, "
-        f"{own['only_b']} only B of {own['trials']}"
-        for own in bad[:MOST_CLASSES]
-    ]
+    said = [f"{_of_class(own)} of {own['trials']} {class_words(own)}" for own in bad[:MOST_CLASSES]]
     more = len(bad) - MOST_CLASSES
     return f"{name}: {'; '.join(said)}{f'; and {more} more classes' if more > 0 else ''}"
+
+
+def _of_class(own: dict[str, Any]) -> str:
+    """Who trips how often; what is zero is left out."""
+    words = {"both": "both", "only_a": "only A", "only_b": "only B"}
+    return ", ".join(f"{own[key]} {name}" for key, name in words.items() if own[key])
 
 
 def _causes(named: Named) -> str:

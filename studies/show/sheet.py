@@ -184,18 +184,20 @@ def _apart(rows: list[dict[str, Any]]) -> list[str]:
     alarms = [0, 0]
     for row in rows:
         for own in row["classes"]:
-            if own["kind"] != "apart" or own["trips"] is None:
+            if own["kind"] != "apart" or own["side"] != "inside" or own["trips"] is None:
                 continue
             if "alarms" in own:
                 alarms = [alarms[0] + own["alarms"], alarms[1] + own["trials"]]
-            elif own["side"] == "inside":
+            else:
                 total = trips.setdefault(class_words(own), [0, 0])
                 total[0], total[1] = total[0] + own["trips"], total[1] + own["trials"]
     said = [f"{name} {_whole_percent(k, n)} of {n}" for name, (k, n) in trips.items()]
     lines = wrapped(f"told apart, share that trips: {', '.join(said)}.") if said else []
     if alarms[1]:
         share = _whole_percent(*alarms)
-        lines += wrapped(f"wiring faults: {share} of {alarms[1]} raise the alarm.")
+        lines += wrapped(
+            f"wiring faults at a terminal's own points: {share} of {alarms[1]} raise the alarm."
+        )
     return ["", *lines] if lines else []
 
 

@@ -214,9 +214,9 @@ def test_an_opposite_swap_of_load_trips_without_any_noise(radial: Scene) -> None
     evidence = swap(radial, 500.0, 450.0)
     t = row(radial, "R2", "R3")
     z = evidence.z1_ohm[t, 0]
-    assert abs(z) == pytest.approx(5.75, abs=0.35)
-    assert np.degrees(np.angle(z)) == pytest.approx(-115.0, abs=6.0)
-    assert evidence.di1_a[t, 0] == pytest.approx(2.5, abs=0.15)
+    assert abs(z) == pytest.approx(5.75, abs=0.1)
+    assert np.degrees(np.angle(z)) == pytest.approx(-115.0, abs=1.5)
+    assert evidence.di1_a[t, 0] == pytest.approx(2.5, abs=0.05)
     pair = ("R2", "R3")
     assert reasons(radial, evidence, paper(), *pair) == [Reason.TRIP]
     # the other end sees no more than the line: it objects
@@ -275,14 +275,17 @@ def noisy(at: Scene, phasors: Phasors, draws: int, bounds: Bounds, seed: int) ->
 def test_source_steps_imitate_breaks_and_a_compensated_trigger_sees_through_them(
     radial: Scene,
 ) -> None:
-    """Constant impedances scale with the source: eq. (5) is 0/0, and noise decides (PHYSICS)."""
+    """A step of -2.5 %: constant impedances scale with it, eq. (5) is 0/0, and noise decides.
+
+    The head section trips in 62..85 % of draws at 1.9 A; compensated never (PHYSICS).
+    """
     stepped = radial.steady._replace(emf_pu=radial.steady.emf_pu * 0.975)
     phasors = true_phasors(radial, radial.steady, stepped)
     evidence = noisy(radial, phasors, 4000, Bounds(tve_pct=0.05, current_floor_a=0.05), 41)
     head = row(radial, "R1", "R2")
-    assert evidence.di1_a[head].min() > 1.0
+    assert evidence.di1_a[head].mean() == pytest.approx(1.9, abs=0.05)
     published = verdict(evidence, paper())[head] == Reason.TRIP
-    assert published.mean() > 0.25
+    assert 0.62 < published.mean() < 0.85
     assert not (verdict(evidence, paper(compensated=True)) == Reason.TRIP).any()
 
 

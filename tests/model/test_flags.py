@@ -144,7 +144,7 @@ def test_a_radial_tail_is_dead_with_three_phases_open(behind: Connection | LoadC
     assert np.abs(answer.stub[1]).max() == 0.0
 
 
-@pytest.mark.parametrize("behind", ["D/Yg", "delta"])
+@pytest.mark.parametrize("behind", ["D/Yg", "Y/D", "D/D", "delta"])
 def test_an_island_between_phases_floats_with_three_phases_open_only(
     behind: Connection | LoadConnection,
 ) -> None:
@@ -192,9 +192,13 @@ def test_an_unloaded_yg_yg_unit_holds_three_phases_by_their_sum_only() -> None:
     assert (kinds(answer)[3:6] == FLOATING).all()
 
 
-def test_an_unloaded_d_yg_unit_is_an_empty_stub() -> None:
-    _, answer = broken(chain("D/Yg", unloaded=["D/Yg"]), *MASKS)
+@pytest.mark.parametrize("connection", ["D/Yg", "Y/D", "D/D"])
+def test_an_unloaded_unit_without_a_neutral_is_an_empty_stub(connection: Connection) -> None:
+    """It draws nothing whatever its voltages are, bar the rounding of its leakage."""
+    _, answer = broken(chain(connection, unloaded=[connection]), *MASKS)
     assert (kinds(answer) == DEAD).all()
+    assert (undefined(answer) == is_open(MASKS)).all()
+    assert np.abs(answer.stub[1][is_open(MASKS)]).max() == 0.0
 
 
 @pytest.mark.parametrize("behind", ["Yg/Yg", "D/Yg", "Yg/D", "wye", "delta"])

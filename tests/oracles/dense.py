@@ -51,7 +51,18 @@ from oracles.dense_parts import (
     windings,
 )
 
-from openphase.model.parts import Connection, Feeder, Line, Place
+from openphase.model.parts import (
+    Capacitor,
+    Connection,
+    Der,
+    Feeder,
+    Line,
+    Load,
+    Place,
+    Regulator,
+    Switch,
+    Transformer,
+)
 
 __all__ = [
     "FORTESCUE",
@@ -426,9 +437,12 @@ def _solution(circuit: Circuit, handles: _Handles, found: Found, feeder: Feeder)
 def _buses(feeder: Feeder) -> list[str]:
     """Every bus that is named anywhere, once, in order of appearance."""
     named = [feeder.source.bus]
-    for edge in (*feeder.lines, *feeder.switches, *feeder.regulators):
+    edges: list[Line | Switch | Regulator] = [*feeder.lines, *feeder.switches, *feeder.regulators]
+    for edge in edges:
         named += [edge.from_bus, edge.to_bus]
-    for item in (*feeder.transformers, *feeder.loads, *feeder.ders, *feeder.capacitors):
+    items: list[Transformer | Load | Der | Capacitor] = [*feeder.transformers, *feeder.loads]
+    items += [*feeder.ders, *feeder.capacitors]
+    for item in items:
         if item.place is not None and item.place.bus is not None:
             named.append(item.place.bus)
     return list(dict.fromkeys(named))

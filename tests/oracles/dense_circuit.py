@@ -315,7 +315,8 @@ def solve_circuit(circuit: Circuit, start: Mapping[str, Floats], *, hold: bool =
     eye = np.eye(len(pu))
     count = 0
     for count in range(1, 1 if hold else MAX_ITERATIONS + 1):
-        v = np.linalg.solve(eye + z @ (admittance(pu) - y_start), v_start)
+        reduced = eye + z @ (admittance(pu) - y_start)
+        v = np.asarray(np.linalg.solve(reduced, v_start), dtype=np.complex128)
         found = magnitudes(v)
         change = found - pu
         relevant = change[bends & (np.maximum(found, pu) > FLOOR_PU)]

@@ -312,7 +312,11 @@ def add_capacitor(circuit: Circuit, bank: Capacitor, at: Windings) -> None:
     """Group ``NAME.capacitor``, a constant admittance."""
     y = 1j * bank.kvar * 1000.0 / 3 / at.v_nominal**2
     circuit.groups[f"{bank.name}.capacitor"] = Group(
-        plus=at.plus, minus=at.minus, v_nominal=at.v_nominal, y_s=y * np.eye(3), exponent=2.0
+        plus=at.plus,
+        minus=at.minus,
+        v_nominal=at.v_nominal,
+        y_s=y * np.eye(3, dtype=np.complex128),
+        exponent=2.0,
     )
 
 

@@ -22,7 +22,7 @@ from openphase.model.parts import (
     Transformer,
 )
 
-__all__ = ["furnished", "random_full_feeder"]
+__all__ = ["FOUR_WIRE", "THREE_WIRE", "furnished", "random_full_feeder"]
 
 NEUTRALS: tuple[Neutral, ...] = ("solid", "resistor", "petersen", "isolated")
 FOUR_WIRE: tuple[Connection, ...] = ("Yg/Yg", "D/Yg", "Yg/D", "Y/D", "D/D")
@@ -211,8 +211,9 @@ def _regulated(rng: np.random.Generator, feeder: Feeder, name: str, *, ganged: b
 
 def _upper_end(feeder: Feeder, line: Line) -> str:
     """The end of a line nearer the source, ties open."""
-    closed = [s for s in feeder.switches if s.closed]
-    edges = [(x.from_bus, x.to_bus) for x in (*feeder.lines, *closed, *feeder.regulators)]
+    edges = [(x.from_bus, x.to_bus) for x in feeder.lines]
+    edges += [(x.from_bus, x.to_bus) for x in feeder.switches if x.closed]
+    edges += [(x.from_bus, x.to_bus) for x in feeder.regulators]
     reached, new = {feeder.source.bus}, [feeder.source.bus]
     while new:
         bus = new.pop(0)

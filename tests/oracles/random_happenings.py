@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,8 +67,8 @@ def random_happening(rng: np.random.Generator, feeder: Feeder, network: Network)
         event = replace(event, load_factor=rng.uniform(0.0, 1.4, (len(network.loads), 1)))
     if network.machines.ders and rng.random() < 0.4:
         what.add("ders")
-        size = (len(network.machines.ders), 1)
-        event = replace(event, der_factor=rng.choice([0.0, 0.5, 1.0, 1.2], size=size))
+        factor = rng.choice([0.0, 0.5, 1.0, 1.2], size=(len(network.machines.ders), 1))
+        event = replace(event, der_factor=factor)
     return Happening(event=event, what=frozenset(what))
 
 
@@ -159,7 +160,8 @@ def dense_event(
         assert piece is not None
         along = share if network.upward[edge] else 1.0 - share
         fraction = piece.start + along * (piece.stop - piece.start)
-        upper, lower = ("p", "q") if network.upward[edge] else ("q", "p")
+        upper: Literal["p", "q"] = "p" if network.upward[edge] else "q"
+        lower: Literal["p", "q"] = "q" if network.upward[edge] else "p"
         mask = int((event.open_after if after else event.open_before)[0])
         found = DenseEvent(
             open_line=piece.line,

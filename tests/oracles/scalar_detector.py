@@ -100,7 +100,9 @@ def looks_at(
         found = []
         for r in range(4):
             before, now = rows(x[0][end])[r], rows(x[1][end])[r]
-            factor = rows(v[1][0])[r] / rows(v[0][0])[r] if local_v else 1.0
+            earlier = rows(v[0][0])[r]
+            # where the end was dead there is nothing to compensate with
+            factor = rows(v[1][0])[r] / earlier if local_v and earlier else 1.0
             found.append(abs(now - before * factor))
         return found
 

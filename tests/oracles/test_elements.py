@@ -257,10 +257,9 @@ def test_isolated_is_the_limit_of_a_large_resistor(seed: int) -> None:
     feeder = random_full_feeder(np.random.default_rng([seed, 5]), 4)
     lines = tuple(replace(x, c1_nf_per_km=30.0, c0_nf_per_km=15.0) for x in feeder.lines)
     feeder = replace(feeder, lines=lines)
-    none, huge = (
-        replace(feeder, source=replace(feeder.source, neutral=kind, neutral_ohm=ohm))
-        for kind, ohm in (("isolated", 0j), ("resistor", 1e13 + 0j))
-    )
+    source = replace(feeder.source, neutral="isolated", neutral_ohm=0j)
+    none = replace(feeder, source=source)
+    huge = replace(feeder, source=replace(source, neutral="resistor", neutral_ohm=1e13 + 0j))
     event = Event(open_line="L1", open_fraction=0.4, open_phases=(2,))
     assert_equal(solve_dense(none, NONE, event), solve_dense(huge, NONE, event), rtol=1e-7)
 

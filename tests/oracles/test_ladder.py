@@ -3,52 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from dataclasses import replace
+from typing import Any, TypeAlias
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from oracles.dense import DenseSolution, NoSolutionError, NotConvergedError, solve_dense
-from oracles.dense import Event as DenseEvent
-from oracles.random_elements import random_full_feeder
-from oracles.random_happenings import Happening, dense_event, random_happening
+from oracles.comparison import TOLERANCE, Case, Outcome, compare
+from oracles.random_elements import FOUR_WIRE, THREE_WIRE, random_full_feeder
+from oracles.random_happenings import Happening, random_happening
 
 from openphase.model.errors import InputError
-from openphase.model.events.base import apply_event
-from openphase.model.machines import DER_MODELS, carried_over
-from openphase.model.network import Network, compile_network, detached_end
-from openphase.model.parts import Feeder
-from openphase.model.solve import solve, steady_state
-from openphase.model.solver.breaks import DEAD, FLOATING
-from openphase.model.states import NOT_CONVERGED, Answer
+from openphase.model.events.base import apply_event, no_event
+from openphase.model.machines import DER_MODELS, carried_over, machine_state
+from openphase.model.network import CONNECTIONS, compile_network
+from openphase.model.parts import Connection, Feeder, Transformer
+from openphase.model.solve import quiet_state, solve, steady_state
 
-TOLERANCE = 1e-9
 FEEDERS = 500
 
-Complex = NDArray[np.complex128]
 Sample: TypeAlias = "dict[int, tuple[Case, list[Outcome]]]"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Case:
-    """A feeder in one state of its switches, and an event."""
-
-    feeder: Feeder
-    closed: frozenset[str]
-    opened: frozenset[str]
-    network: Network
-    happening: Happening
-
-    @property
-    def detached(self) -> dict[str, str]:
-        """The reference's names of detached line ends, by those of the network."""
-        points = [p for p in self.feeder.points if p.name in self.opened]
-        return {detached_end(p.name): f"{p.line}@{p.bus}" for p in points}
-
-    def event(self, *, after: bool) -> DenseEvent:
-        """The reference's state before or after the event."""
-        return dense_event(self.network, self.happening.event, self.detached, after=after)
+Real = NDArray[np.float64]
 
 
 def a_case(seed: int) -> Case:
@@ -91,108 +66,6 @@ def _transferred(
     if not points or rng.random() < 0.6:
         return frozenset()
     return frozenset({points[int(rng.integers(len(points)))]})
-
-
-def gap_pu(case: Case, answer: Answer, oracle: DenseSolution, event: DenseEvent) -> float:
-    """Largest difference, of voltages in pu of nominal and currents in pu of 1 MVA.
-
-    Where there are larger ones, at resonance or a fault, in pu of the largest.
-    """
-    network, feeder = case.network, case.feeder
-    highest = max(np.abs(v).max() for v in [*oracle.v.values(), *oracle.stubs.values()])
-    v_base = max(feeder.source.v_phase_v, float(highest))
-    largest = max(np.abs(i).max() for i in [*oracle.i_from.values(), oracle.i_source])
-    i_base = max(1e6 / (3 * feeder.source.v_phase_v), float(largest))
-    gaps = [0.0]
-
-    def compare_v(name: str, ours: Complex, theirs: Complex) -> None:
-        for k in range(3):
-            if (name, k) not in oracle.floating:
-                gaps.append(abs(ours[k] - theirs[k]) / v_base)
-
-    ours = {theirs: own for own, theirs in case.detached.items()}
-    for bus, v in oracle.v.items():
-        compare_v(bus, answer.v[network.node(ours.get(bus, bus)), :, 0], v)
-    for line in feeder.lines:
-        edges = network.edges_of(line.name)
-        first, last = edges[0], edges[-1]
-        start = answer.i[2 * first + (not network.upward[first]), :, 0]
-        stop = answer.i[2 * last + network.upward[last], :, 0]
-        start = start if network.upward[first] else -start
-        stop = -stop if network.upward[last] else stop
-        gaps.append(np.abs(start - oracle.i_from[line.name]).max() / i_base)
-        gaps.append(np.abs(stop - oracle.i_to[line.name]).max() / i_base)
-    if event.open_line is not None:
-        upward = network.upward[int(case.happening.event.edge[0])]
-        for n, side in enumerate("pq" if upward else "qp"):
-            name = f"{event.open_line}.{side}"
-            compare_v(name, answer.stub[n, :, 0], oracle.stubs[name])
-    return max(gaps)
-
-
-def winding_voltages(
-    case: Case, answer: Answer, event: DenseEvent
-) -> dict[str, NDArray[np.float64]]:
-    """The ladder's voltages, as a start for the reference."""
-    network = case.network
-    units = network.tree.load_unit
-    found = {name: answer.unit_v_pu[units[n], :3, 0] for n, name in enumerate(network.loads)}
-    own = network.machines
-    for m, unit in enumerate(own.unit):
-        motors = own.motor_load.size
-        name = (
-            f"{network.loads[own.motor_load[m]]}.motor"
-            if m < motors
-            else f"{own.ders[m - motors]}.der"
-        )
-        found[name] = np.full(3, answer.unit_v_pu[unit, 3, 0])
-    for n, shunt in enumerate(event.shunts):
-        if shunt.exponent != 2.0:
-            found[f"shunt {n}"] = answer.unit_v_pu[-1, [shunt.phase], 0]
-    return found
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
-    """How one state compares."""
-
-    how: Literal["agree", "elsewhere", "differ", "unsettled", "no solution", "reference unsettled"]
-    gap: float = np.inf
-    floating: bool = False  #: the reference finds undetermined voltages
-    flagged: bool = False  #: so does the ladder
-
-
-def compare(
-    case: Case, answer: Answer, event: DenseEvent, start: DenseSolution | None, **state: Any
-) -> tuple[Outcome, DenseSolution | None]:
-    """The ladder's answer against the reference; and the reference at the same state.
-
-    Where several operating points exist the reference may have found another. Then what the
-    ladder found must be one as well: the reference, held at the ladder's voltages, must give
-    them back.
-    """
-    flagged = bool(answer.flags[0] & (DEAD | FLOATING))
-    try:
-        oracle = solve_dense(case.feeder, case.closed, event, start=start, **state)
-    except NoSolutionError:
-        return Outcome(how="no solution", flagged=flagged), None
-    except NotConvergedError:
-        return Outcome(how="reference unsettled", flagged=flagged), None
-    found = Outcome(
-        how="unsettled" if answer.flags[0] & NOT_CONVERGED else "agree",
-        gap=gap_pu(case, answer, oracle, event),
-        floating=bool(oracle.floating),
-        flagged=flagged,
-    )
-    if found.how == "unsettled" or found.gap <= TOLERANCE:
-        return found, oracle
-    start = replace(oracle, load_pu=winding_voltages(case, answer, event))
-    held = solve_dense(case.feeder, case.closed, event, start=start, hold=True, **state)
-    moved = max(np.abs(held.load_pu[name] - pu).max() for name, pu in start.load_pu.items())
-    gap = gap_pu(case, answer, held, event)
-    if max(gap, moved) > TOLERANCE:
-        return replace(found, how="differ"), oracle
-    return replace(found, how="elsewhere", gap=gap), held
 
 
 def outcomes(case: Case) -> list[Outcome]:
@@ -298,3 +171,105 @@ def places(case: Case) -> set[str]:
     if edge == len(case.network.nodes):
         return found | {"on the chord"}
     return found | {"in the loop" if case.network.tree.in_loop[edge] else "on a tree"}
+
+
+# Other states than the file's, and from one network to another ------------------------------
+
+
+def test_drawn_states_are_feeders_with_them_written_down() -> None:
+    """A scenario's connections, loads, motors and DER against a feeder that has them."""
+    for seed in range(60):
+        rng = np.random.default_rng([seed, 43])
+        feeder = random_full_feeder(rng, int(rng.integers(1, 6)), with_tie=False)
+        network = compile_network(feeder, motors=True)
+        written, fields, connection = _drawn(rng, feeder, network.connection)
+        state = quiet_state(network, fields["load_scale"], fields["exponent"], fields["machines"])
+        state = state._replace(connection=connection)
+        case = a_quiet_case(written, frozenset(s.name for s in feeder.switches if s.closed))
+        outcome, _ = compare(case, solve(network, state), case.event(after=False), None)
+        assert outcome.how == "agree", seed
+
+
+def _drawn(
+    rng: np.random.Generator, feeder: Feeder, connection: NDArray[np.int64]
+) -> tuple[Feeder, dict[str, Any], NDArray[np.int64]]:
+    """A feeder with other values, the fields of a state that say the same of ``feeder``."""
+    network = compile_network(feeder, motors=True)
+    loads, ders, units = len(feeder.loads), len(feeder.ders), len(feeder.transformers)
+    scale, exponent = rng.uniform(0.2, 1.1, (loads, 1)), rng.uniform(0.0, 2.0, (loads, 1))
+    share, ratio = rng.uniform(0.0, 1.0, (loads, 1)), rng.uniform(2.0, 8.0, (loads, 1))
+    level = rng.uniform(0.0, 1.2, (ders, 1))
+    drawn = [_other_connection(rng, unit, feeder.source.wires) for unit in feeder.transformers]
+    connection = connection[:, None].copy()
+    connection[:units, 0] = [CONNECTIONS[kind] for kind in drawn]
+    written = replace(
+        feeder,
+        transformers=tuple(
+            replace(unit, connection=kind)
+            for unit, kind in zip(feeder.transformers, drawn, strict=True)
+        ),
+        loads=tuple(
+            replace(
+                load,
+                kw=load.kw * scale[n, 0],
+                exponent=float(exponent[n, 0]),
+                motor_share=float(share[n, 0]),
+                motor_y2_y1=float(ratio[n, 0]),
+            )
+            for n, load in enumerate(feeder.loads)
+        ),
+        ders=tuple(replace(der, kw=der.kw * level[n, 0]) for n, der in enumerate(feeder.ders)),
+    )
+    machines = machine_state(network, scale, exponent, share=share, y2_y1=ratio, der_level=level)
+    return written, {"load_scale": scale, "exponent": exponent, "machines": machines}, connection
+
+
+def _other_connection(rng: np.random.Generator, unit: Transformer, wires: int) -> Connection:
+    """Any that the wires allow; a closed delta needs leakage."""
+    kinds = FOUR_WIRE if wires == 4 else THREE_WIRE
+    kinds = kinds if unit.leakage_pu else tuple(kind for kind in kinds if kind.endswith("/Yg"))
+    return kinds[int(rng.integers(len(kinds)))]
+
+
+def a_quiet_case(
+    feeder: Feeder, closed: frozenset[str], opened: frozenset[str] = frozenset()
+) -> Case:
+    """Nothing happens."""
+    network = compile_network(feeder, closed, opened)
+    nothing = Happening(event=no_event(network, 1), what=frozenset())
+    return Case(feeder=feeder, closed=closed, opened=opened, network=network, happening=nothing)
+
+
+def test_switching_from_one_network_to_another() -> None:
+    """The tie closes, and a point opens: DER keep what they had in the network before."""
+    compared: Counter[str] = Counter()
+    for seed in range(150):
+        rng = np.random.default_rng([seed, 44])
+        feeder = random_full_feeder(rng, int(rng.integers(2, 7)), with_tie=True)
+        closed = {s.name for s in feeder.switches if s.closed}
+        if not feeder.ders or not _loop_is_carried(feeder, closed):
+            continue
+        tied = frozenset({*closed, "TIE"})
+        opened = _transferred(rng, feeder, tied)
+        cases = [a_quiet_case(feeder, frozenset(closed)), a_quiet_case(feeder, tied, opened)]
+        how = _switched(cases if rng.random() < 0.7 else cases[::-1])
+        assert how in ("agree", "elsewhere"), seed
+        compared[how] += 1
+        compared["transfer"] += bool(opened)
+    assert compared["agree"] > 50
+    assert compared["transfer"] > 5
+
+
+def _switched(cases: list[Case]) -> str:
+    """From the first network to the second."""
+    before, after = cases
+    first, second = steady_state(before.network), steady_state(after.network)
+    answer = solve(before.network, first)
+    outcome, oracle = compare(before, answer, before.event(after=False), None, opened=before.opened)
+    if oracle is None or outcome.how not in ("agree", "elsewhere"):
+        return outcome.how
+    ones: Real = np.ones((len(before.feeder.ders), 1))
+    second = carried_over(after.network, first, answer, second, ones)
+    found = solve(after.network, second, start=answer.unit_v_pu)
+    state: dict[str, Any] = {"before": oracle, "opened": after.opened}
+    return compare(after, found, after.event(after=True), oracle, **state)[0].how

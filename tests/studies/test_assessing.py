@@ -353,3 +353,16 @@ def test_the_report_of_an_assessment(home: Path, tmp_path: Path) -> None:
         assert f"{row['false_trips']:,} of {row['security_trials']:,}" in page
     pictures = {path.name for path in (tmp_path / "assessed").glob("*.png")}
     assert {"feeder.png", "overview.png", "01-R1-R2-evidence.png"} <= pictures
+
+
+def test_a_sheet_without_groups_is_that_of_the_only_group(copy: Path) -> None:
+    """To take a column away that says nothing is no change of the settings."""
+    path = copy / "sized" / "settings.csv"
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    keys = [key for key in rows[0] if key != "setting_group"]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, keys, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+    assert assess(copy, path).result["assessed"]["run_beside"]["edited"] is False

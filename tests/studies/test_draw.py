@@ -7,6 +7,7 @@ drawn in test_draw_classes.py.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import fields, replace
 from typing import Any
@@ -263,15 +264,25 @@ def test_instruments_err_anew_at_every_point_and_in_every_scenario(
         assert np.unique(noise).size == noise.size
         assert abs(np.mean(noise[0] * noise[1].conj())) < 0.01
     lasting = (errors.v_ratio, errors.v_angle, errors.i_ratio, errors.i_angle)
-    for error in lasting:
-        assert error.shape == (points, 3, N)
+    assert {error.shape for error in lasting} == {(points, 3, N)}
     assert errors.clock.shape == (points, N)
     assert errors.frequency.shape == (N,)
     for error in (*lasting, errors.clock, errors.frequency):
+        assert np.abs(error).max() <= 1.0
+
+
+def test_what_lasts_of_the_errors_is_uniform_and_independent(steps: Scenarios) -> None:
+    errors = steps.errors
+    clock = np.repeat(errors.clock[:, None], 3, axis=1)
+    rows = [errors.v_ratio, errors.v_angle, errors.i_ratio, errors.i_angle]
+    for error in (*rows, errors.clock, errors.frequency):
         assert_uniform(error.ravel(), -1.0, 1.0)
-    for one, other in zip(lasting, [*lasting[1:], errors.clock[:, None]], strict=True):
-        found = np.corrcoef(one[0, 0], np.broadcast_to(other, (points, 3, N))[0, 0])[0, 1]
-        assert abs(found) < 5.0 / math.sqrt(N)
+    for one, other in itertools.combinations([*rows, clock], 2):
+        assert abs(np.corrcoef(one[0, 0], other[0, 0])[0, 1]) < 5.0 / math.sqrt(N)
+    for error in rows:
+        between = (error[0, 0], error[0, 1]), (error[0, 0], error[1, 0])
+        for one, other in between:
+            assert abs(np.corrcoef(one, other)[0, 1]) < 5.0 / math.sqrt(N)
 
 
 # --- events ----------------------------------------------------------------------------

@@ -95,7 +95,11 @@ def test_nothing_is_quietly_no_number(wires: int, group: int, drawn: DrawClass) 
     assert not lost[opens_all != 0b111].any()
 
 
-@pytest.mark.parametrize(("wires", "group", "drawn"), EVERYTHING)
+@pytest.mark.parametrize(
+    ("wires", "group", "drawn"),
+    # of wrong wiring the side is that of its point
+    [own for own in EVERYTHING if own[2] != DrawClass.WIRING],
+)
 def test_sides_are_those_of_the_taken_apart_feeder(
     wires: int, group: int, drawn: DrawClass
 ) -> None:
@@ -366,6 +370,8 @@ def test_wrong_wiring_alarms_at_its_own_terminals_alone(wires: int, group: int) 
         [(point == t.local_point) | (point == t.remote_point) for t in case.points.terminals]
     )
     assert not alarm[~own].any()
+    np.testing.assert_array_equal(found.side == Side.PATH, own)
+    assert (found.side[~own] == Side.OTHER).all()
     # swapped or rotated labels show in the voltages, which are there always
     labels = np.isin(kind, [1, 2, 3, 4, 5, 6, 11, 12])
     assert (alarm[own & labels] != 0).all()

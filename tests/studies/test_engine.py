@@ -1,160 +1,402 @@
-"""Blocks from draws to counts, against asking the detector scenario by scenario."""
+"""Blocks from draws to counts, against asking the detector scenario by scenario.
+
+On the paper's feeder, and on one that has everything, in a state of the network that is not
+its normal one.
+"""
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from oracles.brute_settings import brute_front
+from oracles.whole import whole_feeder, whole_study
 
-from openphase.detector.criteria import Reason, Settings, reach_ohm, verdict
+from openphase.detector.criteria import Options, Reason, Settings, reach_of, verdict
 from openphase.model import load_feeder
 from openphase.model.parts import Feeder, Switch
-from openphase.optimise.counts import Corners, count_tensor
+from openphase.model.solver.breaks import DEAD, FLOATING
+from openphase.model.states import NOT_CONVERGED
+from openphase.optimise.counts import Grid, count_tensor
+from openphase.studies.run import tally
 from openphase.studies.run.choose import gather
 from openphase.studies.run.classes import REPORTED, DrawClass, Purpose, Side
-from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case
-from openphase.studies.run.engine import Observed, observe
+from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case, make_cases
+from openphase.studies.run.engine import Observed, observe, options_of
 from openphase.studies.run.store import pack
 from openphase.studies.run.tally import Trained, judge_block, train_block
+from openphase.studies.run.verdicts import unpack_verdicts
 from openphase.studies.spec.study_file import Study, default_study
 
-SIZE = 300
+SIZE = 250
 MARGIN = 1.25
+SMALL = Grid(
+    i_set_a=np.array([0.1, 0.3, 0.6, 1.0, 2.0, 5.0]),
+    v_set_pu=np.array([0.002, 0.01, 0.05]),
+    z_set_ohm=np.array([0.5, 1.5, 5.0, 20.0, 100.0]),
+)
+
+NETWORK = {"SOURCE_STEP", "TIE_SWITCHING", "TRANSFER", "DER_RAMP"}
+APART = {"OPEN_THREE", "SINGLE_POLE", "FALLEN_SOURCE_SIDE", "FALLEN_LOAD_SIDE", "WIRING"}
+APART_INSIDE = {"OPEN_WITH_LOAD_STEP", "OPEN_WITH_DER_TRIP"}
+
+BOTH = [("paper", drawn) for drawn in DrawClass if "DER" not in drawn.name]
+BOTH = [one for one in BOTH if one[1] != DrawClass.REGULATOR_TAP]
+BOTH += [("whole", drawn) for drawn in DrawClass]
+KINDS = ["paper", "whole"]
 
 
-def block(drawn: DrawClass, number: int = 0, purpose: Purpose = Purpose.TRAIN) -> BlockId:
-    return BlockId(seed=1, purpose=purpose, attempt=1, drawn=drawn, block=number)
+@functools.cache
+def case_of(kind: str) -> Case:
+    if kind == "paper":
+        return make_case(load_feeder("paper"), default_study("paper"))
+    feeder = whole_feeder(4)
+    return make_cases(feeder, whole_study(feeder))[1]
 
 
-@pytest.fixture(scope="module")
-def case() -> Case:
-    return make_case(load_feeder("paper"), default_study("paper"))
+def block(
+    case: Case, drawn: DrawClass, number: int = 0, purpose: Purpose = Purpose.TRAIN
+) -> BlockId:
+    return BlockId(
+        seed=1, purpose=purpose, attempt=1, drawn=drawn, block=number, group=case.group.index
+    )
 
 
-@pytest.fixture(scope="module")
-def seen(case: Case) -> dict[DrawClass, Observed]:
-    return {own: observe(case, draw_scenarios(case, block(own), SIZE)) for own in DrawClass}
+def look(case: Case, which: BlockId, *options: Options) -> Observed:
+    return observe(case, draw_scenarios(case, which, SIZE), *options)
 
 
-@pytest.fixture(scope="module")
-def trained(case: Case) -> dict[DrawClass, Trained]:
-    return {own: train_block(case, block(own), SIZE) for own in DrawClass}
+@functools.cache
+def seen_of(kind: str, drawn: DrawClass) -> Observed:
+    case = case_of(kind)
+    return look(case, block(case, drawn), options_of(case.study))
 
 
-def must_trip(drawn: DrawClass, seen: Observed, t: int) -> np.ndarray:
-    if drawn != DrawClass.OPEN_PHASE:
+@functools.cache
+def trained_of(kind: str, drawn: DrawClass) -> Trained:
+    case = replace(case_of(kind), grid=SMALL)
+    return train_block(case, block(case, drawn), SIZE)
+
+
+def must_trip(case: Case, drawn: DrawClass, seen: Observed, t: int) -> NDArray[np.bool_]:
+    """Breaks on the path with something beyond them, where the terminal looks at the source."""
+    if drawn != DrawClass.OPEN_PHASE or case.points.terminals[t].load_side:
         return np.zeros(SIZE, np.bool_)
-    return np.asarray((seen.side[t] == Side.PATH) & seen.connected)
+    return np.asarray((seen.side[t] == Side.PATH) & seen.connected & case.judged[t])
 
 
-def must_not_trip(drawn: DrawClass, seen: Observed, t: int) -> np.ndarray:
-    if drawn == DrawClass.OPEN_PHASE:
-        return np.asarray(seen.side[t] == Side.OUTSIDE)
-    return np.full(SIZE, drawn in (DrawClass.LOAD_STEP, DrawClass.SOURCE_STEP))
+def must_not_trip(case: Case, drawn: DrawClass, seen: Observed, t: int) -> NDArray[np.bool_]:
+    """By the contract's list, and apart from the table of classes."""
+    inside = np.isin(seen.side[t], [Side.PATH, Side.LATERAL])
+    if drawn.name in APART or not case.judged[t]:
+        return np.zeros(SIZE, np.bool_)
+    if drawn == DrawClass.OPEN_PHASE or drawn.name in APART_INSIDE:
+        return np.asarray(~inside)
+    return np.ones(SIZE, np.bool_)
 
 
-def random_settings(case: Case, count: int) -> list[tuple[tuple[int, int, int], Settings]]:
-    """Cells of the device's grid and their settings; half of them where things happen."""
-    grid, rng = case.grid, np.random.default_rng(2)
-    found = []
-    for n in range(count):
-        high = grid.shape if n % 2 else (7, 20, 80)
-        v, i, z = (int(rng.integers(most)) for most in high)
-        setting = Settings(
-            i_set_a=float(grid.i_set_a[i]),
-            v_set_pu=float(grid.v_set_pu[v]),
-            z_set_ohm=float(grid.z_set_ohm[z]),
-            negative_sign=case.study.detector.negative_sign,
+def settings_of(grid: Grid) -> list[tuple[tuple[int, int, int], Settings]]:
+    """Every cell of a grid with its setting."""
+    return [
+        (
+            (v, i, z),
+            Settings(
+                i_set_a=float(grid.i_set_a[i]),
+                v_set_pu=float(grid.v_set_pu[v]),
+                z_set_ohm=float(grid.z_set_ohm[z]),
+            ),
         )
-        found.append(((v, i, z), setting))
-    return found
+        for v, i, z in np.ndindex(grid.shape)
+    ]
 
 
 def everything(value: Any) -> dict[str, list[Any]]:
     return {name: array.tolist() for name, array in pack(value).items()}
 
 
-@pytest.mark.parametrize("drawn", DrawClass)
-def test_corners_count_what_the_verdicts_say_at_any_setting(
-    case: Case,
-    seen: dict[DrawClass, Observed],
-    trained: dict[DrawClass, Trained],
-    drawn: DrawClass,
-) -> None:
-    grid, own, known = case.grid, trained[drawn], seen[drawn]
-    settings = random_settings(case, 200)
-    trip = np.array([verdict(known.evidence, one) == Reason.TRIP for _, one in settings])
-    counted = 0
-    for t, terminal in enumerate(case.points.terminals):
-        if terminal.load_side:
-            continue
+# --- training --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kind", "drawn"), BOTH)
+def test_corners_count_what_the_verdicts_say_at_every_setting(kind: str, drawn: DrawClass) -> None:
+    case, own, known = case_of(kind), trained_of(kind, drawn), seen_of(kind, drawn)
+    cells = settings_of(SMALL)
+    trip = np.array([verdict(known.evidence, one) == Reason.TRIP for _, one in cells])
+    for t in range(len(case.points.terminals)):
         for corners, wanted in (
-            (own.opens[t], must_trip(drawn, known, t)),
-            (own.false[t], must_not_trip(drawn, known, t)),
+            (own.opens[t], must_trip(case, drawn, known, t)),
+            (own.false[t], must_not_trip(case, drawn, known, t)),
         ):
-            tensor = count_tensor(grid, corners)
+            tensor = count_tensor(SMALL, corners)
             expected = (trip[:, t] & wanted).sum(axis=1)
-            assert [tensor[cell] for cell, _ in settings] == expected.tolist()
-            counted += int(expected.sum())
-    assert counted > 0 or drawn == DrawClass.OPEN_THREE
+            assert [tensor[cell] for cell, _ in cells] == expected.tolist()
 
 
-def test_stiff_corners_are_breaks_seen_through_the_margin(
-    case: Case, seen: dict[DrawClass, Observed], trained: dict[DrawClass, Trained]
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_sample_trips_by_the_sequence_and_by_the_phases(kind: str) -> None:
+    """What the counts above are compared on would prove little if nothing tripped."""
+    for drawn in (DrawClass.OPEN_PHASE, DrawClass.LOAD_STEP):
+        evidence = seen_of(kind, drawn).evidence
+        by_phases = without = 0
+        for _, one in settings_of(SMALL):
+            alone = replace(one, options=Options(fallback=False))
+            trip = verdict(evidence, one) == Reason.TRIP
+            without += int((verdict(evidence, alone) == Reason.TRIP).sum())
+            by_phases += int((trip & (evidence.di1_a < one.i_set_a)).sum())
+        assert without > 100
+        assert by_phases > 100
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_stiff_corners_are_breaks_seen_through_the_margin(kind: str) -> None:
+    """What is still found where every I and Z is smaller, and every V larger, by the margin."""
+    case, drawn = case_of(kind), DrawClass.OPEN_PHASE
+    assert case.study.certificate.margin == MARGIN
+    known, own = seen_of(kind, drawn), trained_of(kind, drawn)
+    shrunk = replace(
+        known.evidence,
+        di_a=known.evidence.di_a / MARGIN,
+        dv_pu=known.evidence.dv_pu * MARGIN,
+        z_ohm=known.evidence.z_ohm / MARGIN,
+    )
+    counted = 0
+    for cell, one in settings_of(SMALL):
+        trip = verdict(shrunk, one) == Reason.TRIP
+        for t in range(len(case.points.terminals)):
+            expected = int((trip[t] & must_trip(case, drawn, known, t)).sum())
+            assert count_tensor(SMALL, own.stiff[t])[cell] == expected
+            counted += expected
+    assert counted > 0
+
+
+@pytest.mark.parametrize(("kind", "drawn"), BOTH)
+def test_fronts_are_what_nothing_outdoes_of_events_that_must_not_trip(
+    kind: str, drawn: DrawClass
 ) -> None:
-    """What is still found with I and Z raised and V lowered by the margin."""
-    known, own = seen[DrawClass.OPEN_PHASE], trained[DrawClass.OPEN_PHASE]
-    grid = case.grid
-    reach = reach_ohm(known.evidence, True)
-    for t, terminal in enumerate(case.points.terminals):
-        if terminal.load_side:
-            continue
-        wanted = must_trip(DrawClass.OPEN_PHASE, known, t)
-        tensor = count_tensor(grid, own.stiff[t])
-        for cell, one in random_settings(case, 100):
-            found = (
-                (known.evidence.di1_a[t] / MARGIN >= one.i_set_a)
-                & (known.evidence.dv1_pu[t] * MARGIN <= one.v_set_pu)
-                & (reach[t] / MARGIN >= one.z_set_ohm)
+    case, known = case_of(kind), seen_of(kind, drawn)
+    reach = reach_of(known.evidence, options_of(case.study))
+    for t, front in enumerate(trained_of(kind, drawn).front):
+        index = front.scenario[:, 2]
+        assert must_not_trip(case, drawn, known, t)[index].all()
+        assert (front.scenario[:, [0, 1, 3]] == [drawn, 0, case.group.index]).all()
+        # every row of a front is a row of its event
+        rows = np.stack([reach.di_a[t], reach.dv_pu[t], reach.z_ohm[t]])[:, :, index]
+        own = np.stack([front.di_a, front.dv_pu, front.z_ohm])[:, None]
+        caps = np.broadcast_to(reach.di_a[t, :1, index].T, rows.shape[1:]).copy()
+        caps[0] = 0.0
+        assert ((rows == own).all(axis=0) & (caps == front.cap_a)).any(axis=0).all()
+
+
+@pytest.mark.parametrize("drawn", [DrawClass.LOAD_STEP, DrawClass.OPEN_PHASE, DrawClass.LINE_FAULT])
+def test_fronts_are_those_of_comparing_each_with_each(drawn: DrawClass) -> None:
+    case, size = case_of("whole"), 60
+    which = block(case, drawn)
+    own = train_block(case, which, size)
+    seen = observe(case, draw_scenarios(case, which, size), options_of(case.study))
+    reach = reach_of(seen.evidence, options_of(case.study))
+    for t, front in enumerate(own.front):
+        wanted = np.flatnonzero(_must_not(case, drawn, seen, t))
+        names = np.stack([[drawn, 0, n, case.group.index] for n in wanted] or [[0] * 4])
+        events = tuple(x[t][:, wanted] for x in (reach.di_a, reach.dv_pu, reach.z_ohm))
+        found = sorted(
+            (tuple(name), row)
+            for name, *row in zip(
+                front.scenario.tolist(),
+                front.di_a,
+                front.dv_pu,
+                front.z_ohm,
+                front.cap_a,
+                strict=True,
             )
-            assert tensor[cell] == (found & wanted).sum()
+        )
+        brute = sorted((name, list(row)) for row, name in brute_front(events, names[: wanted.size]))
+        assert found == brute
 
 
-def test_fronts_are_of_events_that_must_not_trip(
-    case: Case, seen: dict[DrawClass, Observed], trained: dict[DrawClass, Trained]
-) -> None:
-    for drawn in DrawClass:
-        known = seen[drawn]
-        reach = reach_ohm(known.evidence, True)
-        for t, front in enumerate(trained[drawn].front):
-            index = front.scenario[:, 2]
-            assert must_not_trip(drawn, known, t)[index].all()
-            assert (front.scenario[:, 0] == drawn).all()
-            assert (front.scenario[:, 1] == 0).all()
-            np.testing.assert_array_equal(front.di_a, known.evidence.di1_a[t, index])
-            np.testing.assert_array_equal(front.dv_pu, known.evidence.dv1_pu[t, index])
-            np.testing.assert_array_equal(front.z_ohm, reach[t, index])
+def _must_not(case: Case, drawn: DrawClass, seen: Observed, t: int) -> NDArray[np.bool_]:
+    inside = np.isin(seen.side[t], [Side.PATH, Side.LATERAL])
+    return (
+        np.asarray(~inside if drawn == DrawClass.OPEN_PHASE else inside | ~inside) & case.judged[t]
+    )
 
 
-def test_load_side_terminals_contribute_nothing(
-    case: Case, trained: dict[DrawClass, Trained]
-) -> None:
-    away = [t for t, terminal in enumerate(case.points.terminals) if terminal.load_side]
-    assert [case.points.terminals[t].name for t in away] == ["R2→R1", "R3→R2", "R4→R3", "R4b→R5"]
-    for own in trained.values():
+def test_terminals_that_are_not_judged_contribute_nothing() -> None:
+    case = case_of("paper")
+    away = [t for t, judged in enumerate(case.judged) if not judged]
+    names = [case.points.terminals[t].name for t in away]
+    assert names == ["R2→R1", "R3→R2", "R4→R3", "R4b→R5"]
+    for drawn in case.drawn:
+        own = trained_of("paper", drawn)
         for t in away:
             assert own.front[t].size == 0
             for corners in (own.opens[t], own.stiff[t], own.false[t]):
                 assert corners.cell.size == 0
 
 
-def test_a_break_with_nothing_beyond_it_is_told_from_the_others(
-    case: Case, seen: dict[DrawClass, Observed]
-) -> None:
+def test_with_one_setting_for_all_a_terminal_is_judged_where_it_looks_away_too() -> None:
+    """It keeps its setting there: false trips count, breaks that it cannot see do not."""
+    feeder = whole_feeder(4)
+    study = whole_study(feeder)
+    one = replace(
+        study,
+        network=replace(study.network, settings="one"),
+        detector=replace(study.detector, negative_sign=False),  # or it would save most of them
+    )
+    apart, together = make_cases(feeder, study), make_cases(feeder, one)
+    away = [np.array([t.load_side for t in case.points.terminals]) for case in apart]
+    for n, case in enumerate(apart):
+        np.testing.assert_array_equal(case.judged, ~away[n])
+        np.testing.assert_array_equal(together[n].judged, ~(away[0] & away[1]))
+    turned = np.flatnonzero(away[1] & ~away[0])
+    assert [together[1].points.terminals[t].name for t in turned] == ["R1→R2"]
+    case = together[1]
+    ties, breaks = (
+        train_block(case, block(case, drawn), SIZE)
+        for drawn in (DrawClass.TIE_SWITCHING, DrawClass.OPEN_PHASE)
+    )
+    assert count_tensor(case.grid, ties.false[turned[0]]).any()
+    assert breaks.trials[0, turned[0]] > 0
+    assert not breaks.opens[turned[0]].cell.size
+
+
+@pytest.mark.parametrize(("kind", "drawn"), BOTH)
+def test_trials_are_all_events_each_in_one_class(kind: str, drawn: DrawClass) -> None:
+    own, known = trained_of(kind, drawn), seen_of(kind, drawn)
+    assert (own.trials.sum(axis=0) == SIZE).all()
+    others = [r for r, row in enumerate(REPORTED) if row.drawn != drawn]
+    assert not own.trials[others].any()
+    for r, row in enumerate(REPORTED):
+        if row.drawn == drawn and row.side == "network":
+            assert (own.trials[r] == SIZE).all()
+        elif row.drawn == drawn:
+            np.testing.assert_array_equal(own.trials[r], np.isin(known.side, row.where).sum(axis=1))
+
+
+# --- judging ---------------------------------------------------------------------------
+
+
+def random_settings(case: Case, count: int) -> list[Settings]:
+    """Some settings of the device; half of them where things happen."""
+    grid, rng = case.grid, np.random.default_rng(2)
+    found = []
+    for n in range(count):
+        high = grid.shape if n % 2 else (7, 20, 80)
+        v, i, z = (int(rng.integers(most)) for most in high)
+        found.append(
+            Settings(
+                i_set_a=float(grid.i_set_a[i]),
+                v_set_pu=float(grid.v_set_pu[v]),
+                z_set_ohm=float(grid.z_set_ohm[z]),
+                options=OPTIONS[n % len(OPTIONS)],
+            )
+        )
+    return found
+
+
+OPTIONS = (
+    Options(),
+    Options(fallback=False),
+    Options(negative_sign=False),
+    Options(any_sequence=True, unbalance=0.2),
+    Options(compensated=True, direction=True, both_ends="no_small_z"),
+)
+
+
+@functools.cache
+def chosen_of(kind: str) -> tuple[tuple[Settings | None, ...], ...]:
+    """Three settings a terminal, some of them none."""
+    chosen, count = random_settings(case_of(kind), 30), len(case_of(kind).points.terminals)
+    pairs = [(chosen[t], None, chosen[t + 10]) for t in range(count)]
+    return ((None, None, None), *pairs[1:])
+
+
+@functools.cache
+def judged_of(kind: str, drawn: DrawClass) -> tuple[tally.Tested, Observed]:
+    case = case_of(kind)
+    which = block(case, drawn, 1, Purpose.VALIDATE)
+    return judge_block(case, which, chosen_of(kind), SIZE), look(case, which, *OPTIONS)
+
+
+@pytest.mark.parametrize(("kind", "drawn"), BOTH)
+def test_judged_blocks_count_what_the_verdicts_say(kind: str, drawn: DrawClass) -> None:
+    case, (tested, known) = case_of(kind), judged_of(kind, drawn)
+    alarm = known.evidence.alarm
+    assert alarm is not None
+    for t, settings in enumerate(chosen_of(kind)):
+        reasons = [
+            np.full(SIZE, Reason.BLOCKED) if one is None else verdict(known.evidence, one)[t]
+            for one in settings
+        ]
+        trip = [own == Reason.TRIP for own in reasons]
+        breaks = np.full(SIZE, drawn == DrawClass.OPEN_PHASE) & (known.side[t] == Side.PATH)
+        opens = breaks & known.connected
+        assert tested.reachable[t] == opens.sum()
+        assert tested.found[:, t].tolist() == [int((own & opens).sum()) for own in trip]
+        missed = np.bincount(reasons[0][opens & ~trip[0]], minlength=len(Reason))
+        np.testing.assert_array_equal(tested.missed[t], missed)
+        for r, own in enumerate(REPORTED):
+            members = np.isin(known.side[t], own.where) & (own.drawn == drawn)
+            assert tested.trials[r, t] == members.sum()
+            assert tested.trips[:, r, t].tolist() == [int((x & members).sum()) for x in trip]
+            assert tested.alarms[r, t] == ((alarm[t] != 0) & members).sum()
+            near, one = 0, settings[0]
+            if one is not None:
+                di1_a, dv1_pu = known.evidence.di1_a[t], known.evidence.dv1_pu[t]
+                close = (di1_a > one.i_set_a / 2.0) & (dv1_pu <= one.v_set_pu)
+                near = int((close & members).sum())
+            assert tested.effective[r, t] == near
+        everywhere = replace(case, judged=np.ones_like(case.judged))
+        bad = must_not_trip(everywhere, drawn, known, t) & trip[0]
+        assert set(tested.front[t].scenario[:, 2]) <= set(np.flatnonzero(bad))
+        assert bool(tested.front[t].size) == bool(bad.any())
+        reason, side, reachable = unpack_verdicts(tested.verdicts[t])
+        np.testing.assert_array_equal(reason, reasons[0])
+        np.testing.assert_array_equal(side, known.side[t])
+        np.testing.assert_array_equal(reachable, (known.side[t] == Side.PATH) & known.connected)
+
+
+@pytest.mark.parametrize(("kind", "drawn"), BOTH)
+def test_judged_blocks_add_up(kind: str, drawn: DrawClass) -> None:
+    tested, known = judged_of(kind, drawn)
+    assert (tested.trials.sum(axis=0) == SIZE).all()
+    for part in (tested.effective, tested.alarms, *tested.trips):
+        assert (part >= 0).all()
+        assert (part <= tested.trials).all()
+    np.testing.assert_array_equal(tested.found[0] + tested.missed.sum(axis=1), tested.reachable)
+    assert not tested.missed[:, Reason.TRIP].any()
+    assert (tested.found <= tested.reachable).all()
+    (breaks,) = (r for r, own in enumerate(REPORTED) if own.name == "open_inside")
+    np.testing.assert_array_equal(tested.profile[..., 0].sum(axis=1), tested.trials[breaks])
+    np.testing.assert_array_equal(tested.profile[..., 1].sum(axis=1), tested.trips[0, breaks])
+    assert (tested.profile[..., 1] <= tested.profile[..., 0]).all()
+    bits = [int((known.flags & bit != 0).sum()) for bit in (DEAD, FLOATING, NOT_CONVERGED)]
+    assert tested.flags.tolist() == bits
+    assert not tested.trips[1].any()  # no setting never trips
+    kept = tested.sample.shape[-1]
+    evidence = known.evidence
+    parts = (evidence.di1_a, evidence.dv1_pu, evidence.z1_ohm.real, evidence.z1_ohm.imag)
+    np.testing.assert_array_equal(tested.sample, np.stack([x[:, :kept] for x in parts], axis=1))
+    np.testing.assert_array_equal(tested.sample_side, known.side[:, :kept])
+
+
+def test_alarms_are_for_wrong_wiring() -> None:
+    for kind in KINDS:
+        tested, _ = judged_of(kind, DrawClass.WIRING)
+        assert tested.alarms.sum() > 0.1 * tested.trials.sum()
+        tested, _ = judged_of(kind, DrawClass.LOAD_STEP)
+        assert tested.alarms.sum() <= 0.01 * tested.trials.sum()
+
+
+# --- places, order, merging ------------------------------------------------------------
+
+
+def test_a_break_with_nothing_beyond_it_is_told_from_the_others() -> None:
     """With the tie open the paper's feeder ends at T6 (.9 of R3-R4) and at T3 (.5 of R4-R5)."""
-    known = seen[DrawClass.OPEN_PHASE]
+    case, known = case_of("paper"), seen_of("paper", DrawClass.OPEN_PHASE)
     count = 0
     for edge, share, connected in zip(known.edge, known.share, known.connected, strict=True):
         line, at = case.network.line_fraction(int(edge), float(share))
@@ -162,68 +404,34 @@ def test_a_break_with_nothing_beyond_it_is_told_from_the_others(
         assert connected == (not empty)
         count += empty
     assert 0 < count < SIZE
-    assert not seen[DrawClass.SOURCE_STEP].connected.any()
+    assert not seen_of("paper", DrawClass.SOURCE_STEP).connected.any()
 
 
-@pytest.mark.parametrize("drawn", DrawClass)
-def test_judged_blocks_count_what_the_verdicts_say(case: Case, drawn: DrawClass) -> None:
-    which = block(drawn, 1, Purpose.VALIDATE)
-    known = observe(case, draw_scenarios(case, which, SIZE))
-    chosen = [one for _, one in random_settings(case, 30)]
-    terminals = case.points.terminals
-    settings = tuple(
-        (None, None, None) if own.load_side else (chosen[t], None, chosen[t + 10])
-        for t, own in enumerate(terminals)
-    )
-    tested = judge_block(case, which, settings, SIZE)
-    for t, terminal in enumerate(terminals):
-        trip = [
-            np.zeros(SIZE, np.bool_)
-            if one is None
-            else verdict(known.evidence, one)[t] == Reason.TRIP
-            for one in settings[t]
-        ]
-        opens = must_trip(drawn, known, t)
-        assert tested.reachable[t] == opens.sum()
-        assert tested.found[:, t].tolist() == [int((own & opens).sum()) for own in trip]
-        if not terminal.load_side:
-            assert tested.missed[t].sum() == (opens & ~trip[0]).sum()
-        for r, own in enumerate(REPORTED):
-            inside = known.side[t] != Side.OUTSIDE
-            where = {
-                "open_inside": known.side[t] == Side.PATH,
-                "open_lateral": known.side[t] == Side.LATERAL,
-            }.get(own.name, inside == (own.side == "inside"))
-            members = np.asarray(where) & (own.drawn == drawn)
-            assert tested.trials[r, t] == members.sum()
-            assert tested.trips[:, r, t].tolist() == [int((x & members).sum()) for x in trip]
-            one = settings[t][0]
-            near = 0
-            if one is not None:
-                di1_a, dv1_pu = known.evidence.di1_a[t], known.evidence.dv1_pu[t]
-                close = (di1_a > one.i_set_a / 2.0) & (dv1_pu <= one.v_set_pu)
-                near = int((close & members).sum())
-            assert tested.effective[r, t] == near
-        bad = must_not_trip(drawn, known, t) & trip[0]
-        assert set(tested.front[t].scenario[:, 2]) <= set(np.flatnonzero(bad))
-        assert bool(tested.front[t].size) == bool(bad.any())
-
-
-def test_sides_are_those_of_the_lines(case: Case, seen: dict[DrawClass, Observed]) -> None:
+def test_sides_are_those_of_the_lines() -> None:
     """On the paper's feeder every section is the line of its name (R5-R4b: R4-R5)."""
-    lines = ["R1-R2", "R1-R2", "R2-R3", "R2-R3", "R3-R4", "R3-R4", "R4-R5", "R4-R5"]
-    known = seen[DrawClass.OPEN_PHASE]
+    sections = ("R1-R2", "R2-R3", "R3-R4", "R4-R5")
+    case, known = case_of("paper"), seen_of("paper", DrawClass.OPEN_PHASE)
+
+    def side(own: str, line: str) -> Side:
+        if own == line:
+            return Side.PATH
+        if "R4-R5" in (own, line):
+            return Side.OTHER
+        return Side.DOWNSTREAM if sections.index(line) > sections.index(own) else Side.UPSTREAM
+
     for n in range(SIZE):
         line, _ = case.network.line_fraction(int(known.edge[n]), float(known.share[n]))
-        sides = [Side.PATH if own == line else Side.OUTSIDE for own in lines]
-        assert known.side[:, n].tolist() == sides
-    assert (seen[DrawClass.SOURCE_STEP].side == Side.OUTSIDE).all()
+        assert known.side[::2, n].tolist() == [side(own, line) for own in sections]
+        np.testing.assert_array_equal(known.side[::2, n], known.side[1::2, n])
+    assert (seen_of("paper", DrawClass.SOURCE_STEP).side == Side.NOWHERE).all()
 
 
-def test_blocks_are_the_same_in_any_order(case: Case) -> None:
-    wanted = [block(drawn, n) for drawn in DrawClass for n in range(2)]
-    forward = {which: train_block(case, which, 100) for which in wanted}
-    backward = {which: train_block(case, which, 100) for which in reversed(wanted)}
+@pytest.mark.parametrize("kind", KINDS)
+def test_blocks_are_the_same_in_any_order(kind: str) -> None:
+    case = replace(case_of(kind), grid=SMALL)
+    wanted = [block(case, drawn, n) for drawn in case.drawn for n in range(2)]
+    forward = {which: train_block(case, which, 50) for which in wanted}
+    backward = {which: train_block(case, which, 50) for which in reversed(wanted)}
     for which in wanted:
         assert everything(forward[which]) == everything(backward[which])
     one = gather(forward[which] for which in wanted)
@@ -231,18 +439,27 @@ def test_blocks_are_the_same_in_any_order(case: Case) -> None:
     assert everything(one) == everything(other)
 
 
-def test_many_blocks_are_gathered_as_few(case: Case) -> None:
+def test_a_judged_block_is_the_same_again() -> None:
+    for drawn in case_of("whole").drawn:
+        case = case_of("whole")
+        which = block(case, drawn, 1, Purpose.VALIDATE)
+        again = judge_block(make_cases(case.feeder, case.study)[1], which, chosen_of("whole"), SIZE)
+        first, _ = judged_of("whole", drawn)
+        for name, values in pack(first).items():
+            assert values.tobytes() == pack(again)[name].tobytes()
+
+
+def test_many_blocks_are_gathered_as_few() -> None:
     """Merging on the way, past its step of 32 blocks, changes nothing."""
-    few = [train_block(case, block(drawn), 60) for drawn in DrawClass]
-    whole = gather(few * 20)
-    once = gather(few)
-    np.testing.assert_array_equal(whole.trials, 20 * once.trials)
-    np.testing.assert_array_equal(whole.reachable, 20 * once.reachable)
+    case = case_of("paper")
+    few = [trained_of("paper", drawn) for drawn in case.drawn]
+    whole, once = gather(few * 4), gather(few)
+    np.testing.assert_array_equal(whole.trials, 4 * once.trials)
+    np.testing.assert_array_equal(whole.reachable, 4 * once.reachable)
     for t in range(len(case.points.terminals)):
         assert everything(whole.front[t]) == everything(once.front[t])
         for one, other in ((whole.opens[t], once.opens[t]), (whole.false[t], once.false[t])):
-            expected = Corners(cell=other.cell, count=20 * other.count)
-            assert everything(one) == everything(expected)
+            np.testing.assert_array_equal(count_tensor(SMALL, one), 4 * count_tensor(SMALL, other))
 
 
 def with_a_switch(feeder: Feeder) -> Feeder:
@@ -265,7 +482,7 @@ def test_a_closed_switch_inside_a_section_is_part_of_the_way() -> None:
     case = make_case(with_a_switch(load_feeder("paper")), Study())
     setting = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0)
     settings = tuple((setting,) for _ in case.points.terminals)
-    tested = judge_block(case, block(DrawClass.OPEN_PHASE), settings, SIZE)
+    tested = judge_block(case, block(case, DrawClass.OPEN_PHASE), settings, SIZE)
     # breaks on both halves are inside, and the profile runs over both
     profile = tested.profile[0, :, 0]
     assert profile.sum() == tested.trials[0, 0] > 20

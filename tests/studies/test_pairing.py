@@ -282,3 +282,12 @@ def test_a_folder_without_a_run_is_a_fault_of_the_input(
     assert "must be the folder of a finished run" in capsys.readouterr().err
     assert cli.main(["compare", str(home / "a")]) == cli.BAD_INPUT
     assert "must be two folders at least" in capsys.readouterr().err
+
+
+def test_runs_that_drew_other_classes_are_incomparable(home: Path, other: Path) -> None:
+    """Leaving a class out changes no draw of the others, so the population is the same."""
+    for path in (other / "blocks").glob("*load_step*"):
+        path.unlink()
+    (said,) = refusal(home / "a", other)
+    assert said.startswith(f"{other}: classes drawn must be as in {home / 'a'}, load_step, open_")
+    assert said.endswith("got open_phase, open_three, source_step")

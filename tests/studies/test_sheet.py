@@ -224,7 +224,7 @@ def test_what_is_told_apart_is_summed_over_terminals() -> None:
     said = " ".join(sheet_table(result).split())
     assert "told apart, share that trips: breaks on laterals inside 0 % of 4000" in said
     assert "three-phase breaks inside 50 % of 4000" in said
-    assert "wiring faults: 90 % of 16000 raise the alarm." in said
+    assert "own points: 90 % of 4000 raise the alarm." in said
 
 
 def two_groups() -> dict[str, Any]:

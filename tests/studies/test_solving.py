@@ -113,6 +113,21 @@ def test_json_is_one_object_on_stdout(capsys: pytest.CaptureFixture[str]) -> Non
     ]  # fmt: skip
 
 
+def test_a_trip_by_a_phase_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a sheet 0.798 A stays below the paper's 1 A, and phase a stands in with 28.1 ohm."""
+    assert main(["solve", "paper", "--open", "R2-R3:0.6:a", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    row = terminal(rows, "R2", "R3")
+    assert (row["trip"], row["reason"]) == (True, "trip: a phase, |ΔI1| being below I_set")
+    sheet = tmp_path / "settings.csv"
+    sheet.write_text("local,remote,i_set_a,v_set_pu,z_set_ohm\nR2,R3,0.7,0.05,5\n")
+    assert (
+        main(["solve", "paper", "--open", "R2-R3:0.6:a", "--settings", str(sheet), "--json"]) == 0
+    )
+    row = terminal(json.loads(capsys.readouterr().out), "R2", "R3")
+    assert (row["trip"], row["reason"]) == (True, "trip")
+
+
 def test_a_sheet_decides_who_trips(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sheet = tmp_path / "settings.csv"
     sheet.write_text("local,remote,i_set_a,v_set_pu,z_set_ohm\nR2,R3,0.7,0.05,5\nR3,R2,,,\n")

@@ -1,0 +1,60 @@
+"""All validation blocks of one group, added up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...optimise.staircase import Front, merge_fronts
+from .draw import BlockId
+from .tally import Tested
+
+__all__ = ["Validation", "add_up"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Validation:
+    """All validation blocks of one group together."""
+
+    trials: NDArray[np.int64]  #: (R, T)
+    effective: NDArray[np.int64]  #: (R, T)
+    trips: NDArray[np.int64]  #: (K, R, T)
+    alarms: NDArray[np.int64]  #: (R, T)
+    reachable: NDArray[np.int64]  #: (T,)
+    found: NDArray[np.int64]  #: (K, T)
+    missed: NDArray[np.int64]  #: (T, Reason)
+    profile: NDArray[np.int64]  #: (T, PLACES, 2)
+    front: tuple[Front, ...]
+    flags: NDArray[np.int64]  #: (3,)
+    scenarios: int
+    samples: tuple[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]], ...]  #: for pictures
+
+
+#: what simply adds up over blocks
+ADDED = (
+    *("trials", "effective", "trips", "alarms", "reachable"),
+    *("found", "missed", "profile", "flags"),
+)
+
+SAMPLED_BLOCKS = 25  #: blocks of a class whose kept evidence goes into pictures
+
+
+def add_up(blocks: Iterable[tuple[BlockId, Tested]], size: int) -> Validation:
+    """Add blocks of ``size`` scenarios; memory does not grow with their number."""
+    total: dict[str, Any] = {}
+    front: tuple[Front, ...] = ()
+    samples: list[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]]] = []
+    count = 0
+    for which, block in blocks:
+        count += size
+        for name in ADDED:
+            total[name] = total.get(name, 0) + getattr(block, name)
+        pairs = zip(front, block.front, strict=True) if front else ()
+        front = tuple(merge_fronts(list(pair)) for pair in pairs) or block.front
+        if which.block < SAMPLED_BLOCKS:
+            samples.append((which, block.sample, block.sample_side))
+    return Validation(front=front, scenarios=count, samples=tuple(samples), **total)

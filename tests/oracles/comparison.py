@@ -1,0 +1,146 @@
+"""Answers of the ladder beside those of the dense reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from oracles.dense import DenseSolution, NoSolutionError, NotConvergedError, solve_dense
+from oracles.dense import Event as DenseEvent
+from oracles.random_happenings import Happening, dense_event
+
+from openphase.model.network import Network, detached_end
+from openphase.model.parts import Feeder
+from openphase.model.solver.breaks import DEAD, FLOATING
+from openphase.model.states import NOT_CONVERGED, Answer
+
+__all__ = ["TOLERANCE", "Case", "Outcome", "compare", "gap_pu"]
+
+TOLERANCE = 1e-9
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Case:
+    """A feeder in one state of its switches, and an event."""
+
+    feeder: Feeder
+    closed: frozenset[str]
+    opened: frozenset[str]
+    network: Network
+    happening: Happening
+
+    @property
+    def detached(self) -> dict[str, str]:
+        """The reference's names of detached line ends, by those of the network."""
+        points = [p for p in self.feeder.points if p.name in self.opened]
+        return {detached_end(p.name): f"{p.line}@{p.bus}" for p in points}
+
+    def event(self, *, after: bool) -> DenseEvent:
+        """The reference's state before or after the event."""
+        return dense_event(self.network, self.happening.event, self.detached, after=after)
+
+
+def gap_pu(case: Case, answer: Answer, oracle: DenseSolution, event: DenseEvent) -> float:
+    """Largest difference, of voltages in pu of nominal and currents in pu of 1 MVA.
+
+    Where there are larger ones, at resonance or a fault, in pu of the largest.
+    """
+    network, feeder = case.network, case.feeder
+    highest = max(np.abs(v).max() for v in [*oracle.v.values(), *oracle.stubs.values()])
+    v_base = max(feeder.source.v_phase_v, float(highest))
+    largest = max(np.abs(i).max() for i in [*oracle.i_from.values(), oracle.i_source])
+    i_base = max(1e6 / (3 * feeder.source.v_phase_v), float(largest))
+    gaps = [0.0]
+
+    def compare_v(name: str, ours: Complex, theirs: Complex) -> None:
+        for k in range(3):
+            if (name, k) not in oracle.floating:
+                gaps.append(abs(ours[k] - theirs[k]) / v_base)
+
+    ours = {theirs: own for own, theirs in case.detached.items()}
+    for bus, v in oracle.v.items():
+        compare_v(bus, answer.v[network.node(ours.get(bus, bus)), :, 0], v)
+    for line in feeder.lines:
+        edges = network.edges_of(line.name)
+        first, last = edges[0], edges[-1]
+        start = answer.i[2 * first + (not network.upward[first]), :, 0]
+        stop = answer.i[2 * last + network.upward[last], :, 0]
+        start = start if network.upward[first] else -start
+        stop = -stop if network.upward[last] else stop
+        gaps.append(np.abs(start - oracle.i_from[line.name]).max() / i_base)
+        gaps.append(np.abs(stop - oracle.i_to[line.name]).max() / i_base)
+    if event.open_line is not None:
+        upward = network.upward[int(case.happening.event.edge[0])]
+        for n, side in enumerate("pq" if upward else "qp"):
+            name = f"{event.open_line}.{side}"
+            compare_v(name, answer.stub[n, :, 0], oracle.stubs[name])
+    return max(gaps)
+
+
+def winding_voltages(
+    case: Case, answer: Answer, event: DenseEvent
+) -> dict[str, NDArray[np.float64]]:
+    """The ladder's voltages, as a start for the reference."""
+    network = case.network
+    units = network.tree.load_unit
+    found = {name: answer.unit_v_pu[units[n], :3, 0] for n, name in enumerate(network.loads)}
+    own = network.machines
+    for m, unit in enumerate(own.unit):
+        motors = own.motor_load.size
+        name = (
+            f"{network.loads[own.motor_load[m]]}.motor"
+            if m < motors
+            else f"{own.ders[m - motors]}.der"
+        )
+        found[name] = np.full(3, answer.unit_v_pu[unit, 3, 0])
+    for n, shunt in enumerate(event.shunts):
+        if shunt.exponent != 2.0:
+            found[f"shunt {n}"] = answer.unit_v_pu[-1, [shunt.phase], 0]
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """How one state compares."""
+
+    how: Literal["agree", "elsewhere", "differ", "unsettled", "no solution", "reference unsettled"]
+    gap: float = np.inf
+    floating: bool = False  #: the reference finds undetermined voltages
+    flagged: bool = False  #: so does the ladder
+
+
+def compare(
+    case: Case, answer: Answer, event: DenseEvent, start: DenseSolution | None, **state: Any
+) -> tuple[Outcome, DenseSolution | None]:
+    """The ladder's answer against the reference; and the reference at the same state.
+
+    Where several operating points exist the reference may have found another. Then what the
+    ladder found must be one as well: the reference, held at the ladder's voltages, must give
+    them back.
+    """
+    flagged = bool(answer.flags[0] & (DEAD | FLOATING))
+    try:
+        oracle = solve_dense(case.feeder, case.closed, event, start=start, **state)
+    except NoSolutionError:
+        return Outcome(how="no solution", flagged=flagged), None
+    except NotConvergedError:
+        return Outcome(how="reference unsettled", flagged=flagged), None
+    found = Outcome(
+        how="unsettled" if answer.flags[0] & NOT_CONVERGED else "agree",
+        gap=gap_pu(case, answer, oracle, event),
+        floating=bool(oracle.floating),
+        flagged=flagged,
+    )
+    if found.how == "unsettled" or found.gap <= TOLERANCE:
+        return found, oracle
+    start = replace(oracle, load_pu=winding_voltages(case, answer, event))
+    held = solve_dense(case.feeder, case.closed, event, start=start, hold=True, **state)
+    moved = max(np.abs(held.load_pu[name] - pu).max() for name, pu in start.load_pu.items())
+    gap = gap_pu(case, answer, held, event)
+    if max(gap, moved) > TOLERANCE:
+        return replace(found, how="differ"), oracle
+    return replace(found, how="elsewhere", gap=gap), held
