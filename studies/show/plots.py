@@ -231,6 +231,10 @@ def _draw_settings(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
         zorder=6,
         label=f"reference: {_settings(own)}",
     )
+    if view.window_ohm is not None:
+        text = "window of Z_set in the closed loop"
+        ax.axhspan(*view.window_ohm, color=GREEN, alpha=0.22, lw=0, zorder=0.6)
+        handles.append(Patch(color=GREEN, alpha=0.22, label=text))
     (x0, x1), (y0, y1) = view.device_a, view.device_ohm
     handles += ax.plot(
         [x0, x1, x1, x0, x0],

@@ -125,9 +125,9 @@ def write_report(
             evidence, profile = picture_names(n, _name(row, result))
             view = evidence_view(cases[group], t, row, front, validations[group])
             pictures[evidence] = png_of(plot_evidence, view)
-            pictures[profile] = png_of(
-                plot_profile, profile_view(cases[group], t, validations[group])
-            )
+            if row["i_set_a"] is not None:
+                along = profile_view(cases[group], t, validations[group])
+                pictures[profile] = png_of(plot_profile, along)
     for name, png in pictures.items():
         folder.write(name, png)
     folder.write("report.html", report_html(result, cases[0].study, pictures))

@@ -65,15 +65,22 @@ def terminal_part(n: int, row: Row, result: Row, pictures: dict[str, bytes]) -> 
                 MARKS if "assessed" in result else f"{MARKS} {BORDERS}",
                 pictures,
             ),
-            picture(
-                profile,
-                f"breaks found along {name}",
-                "Found, of all internal breaks of the validation sample in each stretch; ticks "
-                "above: transformers and loads.",
-                pictures,
-            ),
+            _profile(profile, row, name, pictures),
             "</section>",
         ]
+    )
+
+
+def _profile(file: str, row: Row, name: str, pictures: dict[str, bytes]) -> str:
+    """Where breaks are found; without a setting there is nothing to show."""
+    if row["i_set_a"] is None:
+        return ""
+    return picture(
+        file,
+        f"breaks found along {name}",
+        "Found, of all internal breaks of the validation sample in each stretch; ticks above: "
+        "transformers, loads and DER.",
+        pictures,
     )
 
 

@@ -17,6 +17,7 @@ from ..run.along import path_starts
 from ..run.cases import Case
 from ..run.certify import Validation
 from ..run.classes import REPORTED, DrawClass, reported_row
+from ..run.status import window_of
 from ..run.tally import PLACES
 from .sheet import terminal_name
 
@@ -107,6 +108,7 @@ class EvidenceView:
     chosen: Setting | None
     word: str  #: what the setting is called
     reference: Setting
+    window_ohm: tuple[float, float] | None  #: of Z_set in a closed loop; None: no loop, or empty
     device_a: tuple[float, float]  #: smallest and largest I_set
     device_ohm: tuple[float, float]
     limits_a: tuple[float, float]  #: of the axes; events beyond are moved to the edge
@@ -170,7 +172,7 @@ def evidence_view(
     i_grid, z_grid = study.device.i_grid(), study.device.z_grid()
     clouds = _clouds(validation, t, v_set_pu)
     largest = max((float(c.di1_a.max()) for c in clouds if c.di1_a.size), default=0.0)
-    margin = study.certificate.margin
+    margin, window = study.certificate.margin, window_of(case, t)
     return EvidenceView(
         terminal=_name(case, t),
         v_set_pu=v_set_pu,
@@ -181,6 +183,7 @@ def evidence_view(
         chosen=chosen,
         word="chosen" if front is not None else "assessed",
         reference=reference,
+        window_ohm=(window.low_ohm, window.high_ohm) if window and not window.empty else None,
         device_a=(i_grid[0], i_grid[-1]),
         device_ohm=(z_grid[0], z_grid[-1]),
         limits_a=(0.5 * i_grid[0], 1.5 * max(i_grid[-1], largest)),
