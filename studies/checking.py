@@ -165,7 +165,9 @@ def _assumed(feeder: Feeder) -> list[str]:
 
 
 def _plot(feeder: Feeder, path: Path) -> None:
-    from .show.plots import plot_feeder, save_figure  # noqa: PLC0415  (only a picture needs it)
+    # only a picture needs them
+    from .show.feeder_plot import plot_feeder  # noqa: PLC0415
+    from .show.figures import save_figure  # noqa: PLC0415
 
     if path.suffix.lower() not in (".png", ".svg"):
         raise InputError.single("--plot", "", path.name, "must end in .png or .svg")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...detector.criteria import Options, Reason, Settings, reach_of, verdict
+from ...detector.criteria import Options, Reach, Reason, Settings, reach_of, verdict
 from ...detector.evidence import only
 from ...model.solver.breaks import DEAD, FLOATING
 from ...model.states import NOT_CONVERGED
@@ -56,7 +56,7 @@ class Tested:
     front: tuple[Front, ...]  #: false trips of the chosen setting, per terminal
     flags: Int  #: (3,) scenarios dead, floating, not converged
     verdicts: NDArray[np.uint8]  #: (T, S) what the first setting said, as ``pack_verdicts``
-    sample: NDArray[np.float64]  #: (T, 4, KEPT) |ΔI1| A, |ΔV1| pu, Z1 real and imaginary Ω
+    sample: NDArray[np.float64]  #: (T, 5, KEPT) as ``_sample`` has it
     sample_side: NDArray[np.int8]  #: (T, KEPT)
 
 
@@ -102,9 +102,9 @@ def judge_block(
     reason = _reasons(seen, settings, size)
     trip = reason == Reason.TRIP
     reachable = _reachable(rows, seen)
-    terminals, kept = range(len(settings)), slice(0, KEPT)
+    terminals = range(len(settings))
     missed = reachable & ~trip[0]
-    sample = (evidence.di1_a, evidence.dv1_pu, evidence.z1_ohm.real, evidence.z1_ohm.imag)
+    reach = [_reach(seen, t, settings[t][0]) for t in terminals]
     return Tested(
         trials=_counted(rows),
         effective=_counted(rows, _effective(seen, settings)),
@@ -117,13 +117,14 @@ def judge_block(
         ),
         profile=_profile(case, rows, seen, trip[0]),
         front=tuple(
-            _false_trips(seen, t, settings[t][0], rows[t], trip[0, t], _identity(which, size))
-            for t in terminals
+            _false_trips(reach[t], rows[t], trip[0, t], _identity(which, size)) for t in terminals
         ),
         flags=np.array([(seen.flags & bit != 0).sum() for bit in (DEAD, FLOATING, NOT_CONVERGED)]),
         verdicts=pack_verdicts(reason[0], seen.side, seen.connected),
-        sample=np.stack([values[:, kept] for values in sample], axis=1),
-        sample_side=seen.side[:, kept],
+        sample=np.stack(
+            [_sample(reach[t], np.abs(evidence.z1_ohm[t]), reason[0, t]) for t in terminals]
+        ),
+        sample_side=seen.side[:, :KEPT],
     )
 
 
@@ -162,12 +163,26 @@ def _alarmed(seen: Observed) -> Flags:
     return np.zeros(seen.side.shape, np.bool_) if alarm is None else alarm != 0
 
 
-def _false_trips(
-    seen: Observed, t: int, chosen: Settings | None, rows: Int, trip: Flags, identity: Int
-) -> Front:
-    """The front of the events that tripped the chosen setting of terminal t and must not."""
+def _reach(seen: Observed, t: int, chosen: Settings | None) -> Reach:
+    """Reach at terminal t with the options of its setting; without one, of the bare criteria."""
+    return reach_of(only(seen.evidence, t), chosen.options if chosen else Options(fallback=False))
+
+
+def _sample(
+    reach: Reach, z1_ohm: NDArray[np.float64], reason: NDArray[np.int8]
+) -> NDArray[np.float64]:
+    """(5, KEPT): what pictures show of one terminal's events.
+
+    By the positive sequence: current A, |ΔV1| pu, |Z1| Ω, and the largest Z_set at which it can
+    trip, 0 for none; then the Reason that the first setting gives.
+    """
+    rows = (reach.di_a[0, 0], reach.dv_pu[0, 0], z1_ohm, reach.z_ohm[0, 0], reason)
+    return np.stack([np.asarray(row, np.float64)[:KEPT] for row in rows])
+
+
+def _false_trips(reach: Reach, rows: Int, trip: Flags, identity: Int) -> Front:
+    """The front of the events that tripped the chosen setting of a terminal and must not."""
     bad = _of_kind("must_not_trip", rows) & trip
-    reach = reach_of(only(seen.evidence, t), chosen.options if chosen else Options(fallback=False))
     return front_of(
         reach.di_a[0][:, bad], reach.dv_pu[0][:, bad], reach.z_ohm[0][:, bad], identity[bad]
     )

@@ -53,6 +53,7 @@ class FeederLayout:
     sections: tuple[str, ...]
     wires: tuple[Wire, ...]
     units: tuple[Mark, ...]  #: transformers, and all else that stands on the feeder
+    kinds: tuple[str, ...]  #: what they are
     points: tuple[Mark, ...]
     ties: tuple[Tie, ...]
     reach_km: float
@@ -75,6 +76,7 @@ def lay_out(feeder: Feeder) -> FeederLayout:
         sections=tuple(f"{s.local}–{s.remote}" for s in feeder.sections),
         wires=wires,
         units=_units(feeder, by_line, km, row),
+        kinds=_kinds(feeder),
         points=tuple(
             Mark(
                 text=p.name, km=_beside(by_line[p.line], km[p.bus], reach), row=by_line[p.line].row
@@ -177,6 +179,18 @@ def _units(
     for place, text in _labels(feeder):
         at[stands(place)].append(text)
     return tuple(Mark(text="\n".join(texts), km=x, row=r) for (x, r), texts in sorted(at.items()))
+
+
+def _kinds(feeder: Feeder) -> tuple[str, ...]:
+    """What stands on the feeder; what hangs on a transformer is part of that."""
+    there = {
+        "transformer": bool(feeder.transformers),
+        "load": any(load.place is not None for load in feeder.loads),
+        "DER": any(der.place is not None for der in feeder.ders),
+        "capacitor": bool(feeder.capacitors),
+        "regulator": bool(feeder.regulators),
+    }
+    return tuple(kind for kind, stands in there.items() if stands)
 
 
 def _labels(feeder: Feeder) -> list[tuple[Place, str]]:

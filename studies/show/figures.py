@@ -17,6 +17,7 @@ from matplotlib.figure import Figure, SubFigure
 
 __all__ = [
     "BLUE",
+    "BROWN",
     "DPI",
     "GREEN",
     "GREY",
@@ -38,7 +39,7 @@ T = TypeVar("T")
 DPI = 120
 # Okabe and Ito's colours, which the colour-blind tell apart
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
-SKY, YELLOW, GREY = "#56B4E9", "#F0E442", "#777777"
+SKY, YELLOW, GREY, BROWN = "#56B4E9", "#F0E442", "#777777", "#6b4c00"
 
 TALLEST = 100.0  #: inches that rows of a picture may take
 

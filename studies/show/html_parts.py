@@ -17,6 +17,7 @@ __all__ = [
     "dependability_text",
     "ends",
     "false_trips_cell",
+    "folded",
     "interval_text",
     "k_of_n",
     "margin_text",
@@ -45,6 +46,11 @@ def table(head: Iterable[str], rows: Iterable[str], kind: str = "") -> str:
 def bullets(items: Iterable[str]) -> str:
     """A list of plain texts."""
     return "<ul>\n" + "\n".join(f"<li>{escape(item)}</li>" for item in items) + "\n</ul>"
+
+
+def folded(summary: str, body: str) -> str:
+    """Something that opens when its summary is clicked; paper shows it open."""
+    return f"<details><summary>{escape(summary)}</summary>\n{body}</details>\n"
 
 
 def picture(name: str, alt: str, caption: str, pictures: dict[str, bytes]) -> str:

@@ -1,18 +1,19 @@
-"""Pictures: each takes data and draws it; none computes, and none opens a window."""
+"""Pictures of a run: each takes data and draws it; none computes, and none opens a window."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
+from matplotlib.ticker import FuncFormatter, PercentFormatter
 from numpy.typing import NDArray
 
-from ...model.parts import Feeder
-from .feeder_layout import FeederLayout, Mark, Tie, lay_out
 from .figures import (
     BLUE,
+    BROWN,
     GREEN,
     GREY,
     ORANGE,
@@ -32,7 +33,6 @@ from .views import Bar, Cloud, EvidenceView, Family, OverviewView, ProfileView, 
 
 __all__ = [
     "plot_evidence",
-    "plot_feeder",
     "plot_overview",
     "plot_profile",
     "png_of",
@@ -48,14 +48,15 @@ FAMILIES: dict[Family, tuple[str, str]] = {
     Family.LOAD: (ORANGE, "s"),
     Family.SOURCE: (GREEN, "D"),
     Family.FAULT: (RED, "^"),
-    Family.SWITCHING: (SKY, "p"),
-    Family.DER: (YELLOW, "h"),
+    Family.SWITCHING: ("black", "p"),
+    Family.DER: (BROWN, "h"),
     Family.PAIR: (GREY, "X"),
 }
 """Colour and marker of each family of classes."""
 
-SECTION_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
-CROWDED = 24  #: units beyond which a schematic shows their names only
+PHASES, FALSE = "found by the phases that stand in below I_set", "false trip of this setting"
+RINGS = {PHASES: "black", FALSE: "#c00000"}
+"""Colour of the rings around what trips otherwise than the picture's axes tell, or falsely."""
 
 
 # ---- evidence ----
@@ -64,12 +65,14 @@ CROWDED = 24  #: units beyond which a schematic shows their names only
 @house_style()
 def plot_evidence(view: EvidenceView, ax: Axes | None = None) -> Axes:
     """Draw a terminal's events in the plane of |ΔI1| and |Z1|, and the settings among them."""
-    ax = axes_or_new(ax, 8.6, 7.4)
+    ax = axes_or_new(ax, 8.6, 7.6)
     low = np.array([view.limits_a[0], view.limits_ohm[0]])
     high = np.array([view.limits_a[1], view.limits_ohm[1]])
     ax.set(xscale="log", yscale="log", xlim=view.limits_a, ylim=view.limits_ohm)
     handles = [_draw_cloud(ax, cloud, low, high) for cloud in view.clouds]
     handles = handles[-1:] + handles[:-1]  # what must trip is drawn last and named first
+    if view.chosen is not None:
+        handles += _draw_trips(ax, view, view.chosen, low, high)
     handles += _draw_borders(ax, view)
     handles += _draw_settings(ax, view)
     for axis in (ax.xaxis, ax.yaxis):
@@ -77,15 +80,22 @@ def plot_evidence(view: EvidenceView, ax: Axes | None = None) -> Axes:
     ax.grid(True)
     ax.set_xlabel("|ΔI1| and I_set [A]")
     ax.set_ylabel("|Z1| and Z_set [Ω]")
-    sign = "Re Z1 < 0 and " if view.negative_sign else ""
     ax.set_title(
         f"{view.terminal}: a sample of the validation events, judged at V_set "
-        f"{_percent(view.v_set_pu)}\nfull colour: {sign}|ΔV1| ≤ V_set, trips every setting to its "
-        "lower left; faint: cannot trip; on the frame: beyond",
-        fontsize=9.5,
+        f"{_percent(view.v_set_pu)}\nfull colour: by its positive sequence, trips every setting "
+        "to its lower left; faint: cannot trip; on the frame: beyond",
+        fontsize=9,
     )
-    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2)
+    ax.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2, fontsize=8.2
+    )
     return ax
+
+
+def _inside(cloud: Cloud, low: Real, high: Real) -> tuple[Real, Real]:
+    """A cloud's events, those beyond the frame moved onto it."""
+    x = np.clip(cloud.di1_a, low[0] * 1.04, high[0] / 1.04)
+    return x, np.clip(cloud.z1_ohm, low[1] * 1.05, high[1] / 1.05)
 
 
 def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch:
@@ -93,8 +103,7 @@ def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch
     colour, marker = FAMILIES[cloud.family]
     must_trip = cloud.family == Family.INSIDE
     size = 24 if must_trip else 13
-    x = np.clip(cloud.di1_a, low[0] * 1.04, high[0] / 1.04)
-    y = np.clip(cloud.z1_ohm, low[1] * 1.05, high[1] / 1.05)
+    x, y = _inside(cloud, low, high)
     unable = ~cloud.able
     ax.scatter(
         x[unable],
@@ -126,8 +135,33 @@ def _draw_cloud(ax: Axes, cloud: Cloud, low: Real, high: Real) -> Line2D | Patch
         marker=marker,
         color=colour,
         markersize=5,
-        label=f"{cloud.family} ({able} of {x.size} shown can trip)",
+        label=f"{cloud.family} ({able:,} of {x.size:,} shown can trip)",
     )
+
+
+def _draw_trips(
+    ax: Axes, view: EvidenceView, own: Setting, low: Real, high: Real
+) -> list[Line2D | Patch]:
+    """Ring what the setting trips by its phases, and what it trips falsely."""
+    rings: dict[str, list[tuple[Real, Real]]] = {PHASES: [], FALSE: []}
+    for cloud in view.clouds:
+        x, y = _inside(cloud, low, high)
+        if cloud.family == Family.INSIDE:
+            # the phases stand in only where the positive sequence stays below I_set
+            kind, ringed = PHASES, cloud.trips & (cloud.di1_a < own.i_set_a)
+        else:
+            kind, ringed = FALSE, cloud.trips
+        rings[kind].append((x[ringed], y[ringed]))
+    handles: list[Line2D | Patch] = []
+    for text, parts in rings.items():
+        if not sum(own.size for own, _ in parts):
+            continue
+        x = np.concatenate([own for own, _ in parts])
+        y = np.concatenate([own for _, own in parts])
+        look: dict[str, Any] = {"marker": "o", "mec": RINGS[text], "mfc": "none", "mew": 1.1}
+        ax.plot(x, y, ls="", ms=8, zorder=6, **look)
+        handles.append(Line2D([], [], ls="", ms=8, label=f"{text} ({x.size:,} shown)", **look))
+    return handles
 
 
 def _draw_borders(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
@@ -173,7 +207,7 @@ def _draw_settings(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
             lw=0.9,
             zorder=5,
         )
-        label = f"chosen: {_settings(own)}, and what it trips"
+        label = f"{view.word}: {_settings(own)}, and what it trips"
         handles += ax.plot(
             own.i_set_a,
             own.z_set_ohm,
@@ -197,6 +231,10 @@ def _draw_settings(ax: Axes, view: EvidenceView) -> list[Line2D | Patch]:
         zorder=6,
         label=f"reference: {_settings(own)}",
     )
+    if view.window_ohm is not None:
+        text = "window of Z_set in the closed loop"
+        ax.axhspan(*view.window_ohm, color=GREEN, alpha=0.22, lw=0, zorder=0.6)
+        handles.append(Patch(color=GREEN, alpha=0.22, label=text))
     (x0, x1), (y0, y1) = view.device_a, view.device_ohm
     handles += ax.plot(
         [x0, x1, x1, x0, x0],
@@ -252,8 +290,9 @@ OVERVIEW = ((BLUE, ""), (SKY, ""), ("#bdbdbd", "///"))  #: colour and hatch of e
 @house_style()
 def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
     """Draw the dependability of the compared settings of every judged terminal."""
-    ax = axes_or_new(ax, 8.6, 1.5 + min(0.95 * len(view.terminals), TALLEST))
-    step = 0.27
+    row_height = 0.2 + 0.25 * len(view.names)
+    ax = axes_or_new(ax, 8.6, 1.5 + min(row_height * len(view.terminals), TALLEST))
+    step = 0.25 / row_height
     for t, bars in enumerate(view.bars):
         for n, bar in enumerate(bars):
             _draw_bar(ax, t + step * (n - (len(bars) - 1) / 2), bar, n, 0.9 * step)
@@ -268,7 +307,7 @@ def plot_overview(view: OverviewView, ax: Axes | None = None) -> Axes:
         Patch(facecolor=colour, edgecolor="white", hatch=hatch, label=name)
         for name, (colour, hatch) in zip(view.names, OVERVIEW, strict=False)
     ]
-    below = -0.55 / (0.95 * len(view.terminals))
+    below = -0.55 / (row_height * len(view.terminals))
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, below), ncols=3)
     return ax
 
@@ -301,122 +340,3 @@ def _settings(own: Setting) -> str:
 
 def _percent(pu: float) -> str:
     return f"{setting_text(pu * 100)} %"
-
-
-# ---- the feeder ----
-
-
-@house_style()
-def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
-    """Draw a schematic of a feeder: km from the source, one row for each branch."""
-    layout = lay_out(feeder)
-    crowded = len(layout.units) > CROWDED
-    row_height = 0.7 if crowded else 1.35
-    ax = axes_or_new(ax, 11.0, 1.6 + min(row_height * layout.rows, TALLEST))
-    _draw_wires(ax, layout)
-    for tie in layout.ties:
-        _draw_tie(ax, tie, layout.reach_km)
-    for unit in layout.units:
-        _draw_unit(ax, unit, crowded)
-    for point in layout.points:
-        ax.plot(
-            point.km,
-            point.row,
-            "o",
-            color="white",
-            markeredgecolor="black",
-            ms=8,
-            mew=1.4,
-            zorder=5,
-        )
-        _write(ax, point, point.text, below=True, size=9.5, weight="bold")
-    ax.plot(0, 0, "s", color="black", ms=11, zorder=4)
-    source = Mark(text=layout.source, km=0.0, row=0)
-    _write(ax, source, layout.source, below=False, size=9.0, weight="normal")
-    ax.set(xlim=(-0.04 * layout.reach_km, 1.09 * layout.reach_km), ylim=(layout.rows - 0.45, -0.75))
-    ax.set_yticks([])
-    ax.spines["left"].set_visible(False)
-    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set_xlabel("distance from the source along the line [km]")
-    ax.set_title(f"{layout.name}: {len(feeder.lines)} lines, {len(feeder.points)} measuring points")
-    handles = [
-        Line2D([], [], color=SECTION_COLOURS[n % 6], lw=4, label=f"section {name}")
-        for n, name in enumerate(layout.sections)
-    ]
-    handles += [
-        Line2D(
-            [], [], ls="", marker="o", color="white", mec="black", ms=7, label="measuring point"
-        ),
-        Line2D([], [], ls="", marker="^", color="black", ms=6, label="transformer or load"),
-        Line2D([], [], ls="--", marker="s", color="black", mfc="white", ms=7, label="open switch"),
-    ]
-    ax.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.4 / (1 + layout.rows)), ncols=4
-    )
-    return ax
-
-
-def _draw_wires(ax: Axes, layout: FeederLayout) -> None:
-    for wire in layout.wires:
-        x, y = [wire.start_km, wire.stop_km], [wire.row, wire.row]
-        ax.plot([x[0], x[0]], [wire.from_row, wire.row], color="black", lw=1.2, zorder=0.9)
-        if not wire.is_line:
-            ax.plot(wire.stop_km, wire.row, "s", color="black", ms=6, zorder=3)
-            continue
-        if not wire.sections:
-            ax.plot(x, y, color="#999999", lw=2.0, zorder=1)
-        # sections that share a line lie on top of each other, the later the thinner
-        for n, section in enumerate(wire.sections):
-            colour = SECTION_COLOURS[section % len(SECTION_COLOURS)]
-            width = 5.0 * (1.0 - n / len(wire.sections))
-            ax.plot(x, y, color=colour, lw=width, solid_capstyle="butt", zorder=1 + 0.01 * n)
-
-
-def _draw_tie(ax: Axes, tie: Tie, reach_km: float) -> None:
-    (x0, y0), (x1, y1) = tie.ends
-    if tie.at_row_ends:
-        aside = max(x0, x1) + 0.03 * reach_km
-        x, y, middle = [x0, aside, aside, x1], [y0, y0, y1, y1], aside
-    else:
-        x, y, middle = [x0, x1], [y0, y1], (x0 + x1) / 2
-    ax.plot(x, y, color="black", lw=1.1, ls="--", zorder=0.5)
-    ax.plot(middle, (y0 + y1) / 2, "s", color="white", mec="black", ms=9, zorder=3)
-    ax.annotate(
-        f"{tie.name}\nopen",
-        (middle, (y0 + y1) / 2),
-        xytext=(9, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=8.5,
-    )
-
-
-def _draw_unit(ax: Axes, unit: Mark, crowded: bool) -> None:
-    tip = unit.row - (0.12 if crowded else 0.2)
-    ax.plot([unit.km, unit.km], [unit.row, tip], color="black", lw=1.0, zorder=0.8)
-    ax.plot(unit.km, tip, "^", color="black", ms=4 if crowded else 6, zorder=3)
-    text = unit.text.partition("\n")[0] if crowded else unit.text
-    ax.annotate(
-        text,
-        (unit.km, tip),
-        xytext=(0, 5),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-        fontsize=6 if crowded else 8.5,
-        rotation=90 if crowded else 0,
-        linespacing=1.15,
-    )
-
-
-def _write(ax: Axes, at: Mark, text: str, *, below: bool, size: float, weight: str) -> None:
-    ax.annotate(
-        text,
-        (at.km, at.row),
-        xytext=(0, -9 if below else 9),
-        textcoords="offset points",
-        ha="center",
-        va="top" if below else "bottom",
-        fontsize=size,
-        weight=weight,
-    )

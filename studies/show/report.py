@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from ...detector.criteria import Reason
 from ...optimise.staircase import Front
 from ..run.cases import Case
 from ..run.certify import Validation
-from ..run.classes import DrawClass
 from ..run.store import RunFolder
 from ..spec.study_file import Study
 from .assumptions import assumptions
+from .by_class import at_a_glance, by_class, several_groups
 from .html_parts import (
     bound_text,
-    class_trips_cell,
     dependability_text,
     false_trips_cell,
+    folded,
     interval_text,
     k_of_n,
     margin_text,
@@ -29,7 +27,8 @@ from .html_parts import (
     setting_cell,
     table,
 )
-from .sheet import class_words, row_name, setting_text
+from .sheet import row_name, terminal_name
+from .terminal_part import picture_names, terminal_part
 from .views import evidence_view, overview_view, profile_view
 
 __all__ = ["report_html", "write_report"]
@@ -57,16 +56,7 @@ MARGIN = (
     "the first false trip in training."
 )
 
-MARKS = (
-    "Each mark is one event of the validation sample, by its positive sequence. Whatever is in "
-    "full colour trips every setting to its lower left."
-)
-BORDERS = (
-    "The brown region is built from all of the training sample, phases that stand in among it: a "
-    "setting in it trips falsely there. A setting beyond the dashed line keeps the demanded "
-    "margin, in V_set as well."
-)
-KINDS = {"must_trip": "must trip", "must_not_trip": "must not trip", "apart": "in neither count"}
+FEEDER = "The feeder and its sections, every switch as the feeder file has it."
 
 STYLE = """\
 body { font: 15px/1.45 "DejaVu Sans", Verdana, sans-serif; color: #1b1b1b; background: #fff;
@@ -80,16 +70,20 @@ th, td { padding: .3em .6em; border-bottom: 1px solid #ddd; text-align: left; ve
 thead th { border-bottom: 2px solid #888; }
 .n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .w { white-space: nowrap; }
-.sheet tbody tr:nth-child(odd) > * { border-bottom: none; padding-bottom: 0; }
-.sheet tbody tr:nth-child(even) > * { color: #555; }
+.sheet tr:has(+ tr > td:empty) > * { border-bottom: none; padding-bottom: 0; }
+.why { color: #555; }
+.group { background: #f2f2f2; }
 .bad { color: #a33b00; font-weight: bold; }
 .faint, figcaption, footer { color: #555; font-size: .85em; }
 figure { margin: 1em 0; break-inside: avoid; }
 img { max-width: 100%; height: auto; }
+.c { font-weight: normal; }
+details { margin: .6em 0; }
+summary { cursor: pointer; color: #0072b2; }
 dt { font-weight: bold; float: left; clear: left; width: 8.5em; }
 dd { margin: 0 0 .3em 9em; }
 @media print { body { font-size: 10pt; margin: 0; max-width: none; } .wide { overflow: visible; }
-  img { max-height: 12.5cm; }
+  img { max-height: 12.5cm; } details::details-content { content-visibility: visible; }
   section.terminal { break-before: page; } tr, h2, h3 { break-inside: avoid; break-after: auto; } }
 """
 
@@ -117,31 +111,26 @@ def write_report(
         Where the report goes.
     """
     # matplotlib takes half a second to import: only a run that got here pays for it
-    from .plots import plot_evidence, plot_feeder, plot_overview, plot_profile, png_of  # noqa: PLC0415
+    from .feeder_plot import plot_feeder  # noqa: PLC0415
+    from .plots import plot_evidence, plot_overview, plot_profile, png_of  # noqa: PLC0415
 
     pictures = {"feeder.png": png_of(plot_feeder, cases[0].feeder)}
-    if result["compared"]:
+    if _rivals(result):
         pictures["overview.png"] = png_of(plot_overview, overview_view(result))
     terminals = len(cases[0].points.terminals)
     for n, row in enumerate(result["sections"]):
         if row["classes"]:
             group, t = divmod(n, terminals)
             front = None if fronts is None else fronts[group][t]
-            evidence, profile = _picture_names(n, row)
+            evidence, profile = picture_names(n, _name(row, result))
             view = evidence_view(cases[group], t, row, front, validations[group])
             pictures[evidence] = png_of(plot_evidence, view)
-            pictures[profile] = png_of(
-                plot_profile, profile_view(cases[group], t, validations[group])
-            )
+            if row["i_set_a"] is not None:
+                along = profile_view(cases[group], t, validations[group])
+                pictures[profile] = png_of(plot_profile, along)
     for name, png in pictures.items():
         folder.write(name, png)
     folder.write("report.html", report_html(result, cases[0].study, pictures))
-
-
-def _picture_names(t: int, row: dict[str, Any]) -> tuple[str, str]:
-    """Files of a terminal's two pictures; the number keeps them apart whatever the names are."""
-    stem = re.sub(r"[^A-Za-z0-9]+", "-", f"{row['local']}-{row['remote']}").strip("-")
-    return f"{t + 1:02d}-{stem}-evidence.png", f"{t + 1:02d}-{stem}-along-line.png"
 
 
 def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]) -> str:
@@ -153,10 +142,12 @@ def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]
         _head(result, study),
         "<h2>Settings sheet</h2>",
         _sheet(result),
-        picture("feeder.png", "schematic of the feeder", "The feeder and its sections.", pictures),
+        _status_words(result, study),
+        picture("feeder.png", "schematic of the feeder", FEEDER, pictures),
+        by_class(result),
         _comparison(result, pictures),
         *(
-            _terminal(n, row, result, pictures)
+            terminal_part(n, row, result, pictures)
             for n, row in enumerate(result["sections"])
             if row["classes"]
         ),
@@ -177,10 +168,26 @@ def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]
 
 def _name(row: dict[str, Any], result: dict[str, Any]) -> str:
     """A row's terminal, with its group where the study has several."""
-    return row_name(row, len({own["setting_group"] for own in result["sections"]}) > 1)
+    return row_name(row, several_groups(result))
 
 
 def _head(result: dict[str, Any], study: Study) -> str:
+    """What was done, and what came of it in a few sentences."""
+    target = study.certificate.target
+    assessed = result.get("assessed", {})
+    note = f'<p class="bad">Note: {escape(assessed["note"])}.</p>\n' if assessed.get("note") else ""
+    return note + (
+        f"{at_a_glance(result, target)}\n"
+        f'<p class="faint">Seed {result["seed"]}, attempt {result["attempt"]}, at least '
+        f"{result['scenarios']:,} scenarios of every class and side. The false-trip bounds of all "
+        f"terminals (for each its worst class) hold together at "
+        f"{percent(result['confidence'], 0)} confidence, over all attempts; so do, apart from "
+        f"them, the dependability intervals of these settings. The "
+        f"target is at most {bound_text(target)} false trips per event.</p>"
+    )
+
+
+def _status_words(result: dict[str, Any], study: Study) -> str:
     demand = study.certificate
     known = {"find": demand.find_at_least, "margin": demand.margin}
     meanings = STATUS | (OF_A_SHEET if "assessed" in result else {})
@@ -188,17 +195,7 @@ def _head(result: dict[str, Any], study: Study) -> str:
         f"<dt>{status}</dt><dd>{escape(text.format(**known))}{_tally(result, status)}</dd>"
         for status, text in meanings.items()
     )
-    assessed = result.get("assessed", {})
-    note = f'<p class="bad">Note: {escape(assessed["note"])}.</p>\n' if assessed.get("note") else ""
-    return note + (
-        f"<p>Seed {result['seed']}, attempt {result['attempt']}, at least "
-        f"{result['scenarios']:,} scenarios of every class and side. The false-trip bounds of all "
-        f"terminals (for each its worst class) hold together at "
-        f"{percent(result['confidence'], 0)} confidence, over all attempts; so do, apart from "
-        f"them, the dependability intervals of these settings. The "
-        f"target is at most {bound_text(demand.target)} false trips per event.</p>\n"
-        f"<h3>What the status words mean</h3>\n<dl>\n{words}\n</dl>"
-    )
+    return folded("What the status words mean", f"<dl>\n{words}\n</dl>")
 
 
 def _tally(result: dict[str, Any], status: str) -> str:
@@ -207,43 +204,63 @@ def _tally(result: dict[str, Any], status: str) -> str:
 
 
 def _sheet(result: dict[str, Any]) -> str:
-    head = (
+    assessed = "assessed" in result  # nothing is known of its margins
+    head = [
         "terminal", "status", "#I_set A", "#V_set %", "#Z_set Ω", "#margin",
         "#dependability (interval)", "#unreachable", "#false trips", "#bound",
-    )  # fmt: skip
-    rows = []
+    ]  # fmt: skip
+    if assessed:
+        head.remove("#margin")
+    wide = len(head) - 2
+    rows: list[str] = []
+    group = None
     for row in result["sections"]:
+        if several_groups(result) and row["setting_group"] != group:
+            group = row["setting_group"]
+            text = f"Setting group {escape(group)}"
+            rows.append(f'<th colspan="{len(head)}" class="group">{text}</th>')
         cells = [
-            f'<th class="w">{escape(_name(row, result))}</th>',
+            f'<th class="w">{escape(terminal_name(row))}</th>',
             f'<td class="w">{escape(row["status"])}</td>',
         ]
+        if row["i_set_a"] is None:
+            why = f'<td colspan="{wide}" class="why">{escape(row["reason"])}</td>'
+            rows.append("".join([*cells, why]))
+            continue
         cells += [
             setting_cell(row["i_set_a"]),
             setting_cell(row["v_set_pu"], 100.0),
             setting_cell(row["z_set_ohm"]),
-            right_cell("–" if "assessed" in result else margin_text(row)),
+            *([] if assessed else [right_cell(margin_text(row))]),
             right_cell(dependability_text(row)),
             right_cell(k_of_n(row["unreachable"], row["opens"])),
             false_trips_cell(row["false_trips"], row["security_trials"]),
             right_cell(bound_text(row["false_trip_upper"])),
         ]
-        rows += ["".join(cells), f'<td></td><td colspan="9">{escape(row["reason"])}</td>']
+        why = f'<td colspan="{wide + 1}" class="why">{escape(row["reason"])}</td>'
+        rows += ["".join(cells), f"<td></td>{why}"]
     return table(head, rows, "sheet") + (
         '<p class="faint">Dependability: breaks found, of those with something connected beyond '
         "them; the unreachable ones have nothing beyond, and change nothing to be measured. "
         "False trips: k of n events that must not trip. Bound: upper bound of the false-trip "
-        f"probability per event, worst class.{'' if 'assessed' in result else MARGIN}</p>"
+        f"probability per event, worst class.{'' if assessed else MARGIN}</p>"
     )
 
 
+def _rivals(result: dict[str, Any]) -> tuple[str, ...]:
+    """The settings side by side; none where there is but one, of which the sheet says it all."""
+    names = tuple(dict.fromkeys(row["name"] for row in result["compared"]))
+    return names if len(names) > 1 else ()
+
+
 def _comparison(result: dict[str, Any], pictures: dict[str, bytes]) -> str:
-    if not result["compared"]:
+    names = _rivals(result)
+    if not names:
         return ""
     head = (
         "terminal", "setting", "#I_set A", "#V_set %", "#Z_set Ω", "#found", "#interval",
         "#false trips", "#bound",
     )  # fmt: skip
-    names = dict.fromkeys(row["name"] for row in result["compared"])
     rows = []
     for row in result["compared"]:
         cells = [
@@ -268,96 +285,4 @@ def _comparison(result: dict[str, Any], pictures: dict[str, bytes]) -> str:
         f"{', '.join(escape(name) for name in names)}.</p>\n"
         + table(head, rows)
         + picture("overview.png", "dependability and false trips of every terminal", "", pictures)
-    )
-
-
-def _terminal(
-    n: int, row: dict[str, Any], result: dict[str, Any], pictures: dict[str, bytes]
-) -> str:
-    evidence, profile = _picture_names(n, row)
-    head = ("class", "side", "kind", "#trials", "#effective trials", "#trips", "#upper bound")
-    rows = [
-        "".join(
-            [
-                f"<td>{escape(_class_name(own))}</td>",
-                f'<td>{escape(own["side"])}</td><td class="w">{KINDS[own["kind"]]}</td>',
-                right_cell(f"{own['trials']:,}"),
-                right_cell(k_of_n(own["effective_trials"], own["trials"])),
-                class_trips_cell(own),
-                # a bound of trips is a merit of security, and says nothing of what must trip
-                right_cell(bound_text(own["upper"]) if own["kind"] != "must_trip" else "–"),
-            ]
-        )
-        for own in row["classes"]
-    ]
-    z1 = complex(*row["line_z1_ohm"])
-    return "\n".join(
-        [
-            '<section class="terminal">',
-            f"<h2>Terminal {escape(_name(row, result))}: {escape(row['status'])}</h2>",
-            f"<p>{_setting(row)} Line between the points: |Z1| = {abs(z1):.2f} Ω.</p>",
-            f"<p>{escape(row['reason'][:1].upper() + row['reason'][1:])}.</p>",
-            table(head, rows),
-            '<p class="faint">Effective trials come near the thresholds: |ΔI1| > I_set/2 and '
-            "|ΔV1| ≤ V_set. Where they are few, no trips show little.</p>",
-            _causes(row),
-            _nearest(row),
-            picture(
-                evidence,
-                f"evidence of {row['local']} to {row['remote']}",
-                MARKS if "assessed" in result else f"{MARKS} {BORDERS}",
-                pictures,
-            ),
-            picture(
-                profile,
-                f"breaks found along {row['local']} to {row['remote']}",
-                "Found, of all internal breaks of the validation sample in each stretch; ticks "
-                "above: transformers and loads.",
-                pictures,
-            ),
-            "</section>",
-        ]
-    )
-
-
-def _class_name(own: dict[str, Any]) -> str:
-    """A class in words; of wrong wiring, how often the alarm was raised."""
-    alarms = f" (alarm in {own['alarms']:,})" if "alarms" in own else ""
-    return class_words(own) + alarms
-
-
-def _setting(row: dict[str, Any]) -> str:
-    if row["i_set_a"] is None:
-        return "No setting."
-    margin = "" if row["margin"] is None else f", margin {margin_text(row)}"
-    return (
-        f"I_set {setting_text(row['i_set_a'])} A ({setting_text(row['i_set_pu'])} pu), "
-        f"V_set {setting_text(row['v_set_pu'] * 100.0)} %, "
-        f"Z_set {setting_text(row['z_set_ohm'])} Ω{margin}."
-    )
-
-
-def _causes(row: dict[str, Any]) -> str:
-    if row["detected"] is None:
-        return ""
-    missed = row["opens"] - row["unreachable"] - row["detected"]
-    begin = f"<p><b>Missed breaks</b> (with something connected beyond): {missed:,}"
-    if not row["causes"]:
-        return f"{begin}.</p>"
-    found = [
-        f"{percent(cause['share'])} {escape(Reason[cause['criterion'].upper()].text)}"
-        for cause in row["causes"]
-    ]
-    sign = "" if row["negative_sign"] else " (the sign is not used)"
-    return f"{begin}; the first criterion that failed{sign}: {'; '.join(found)}.</p>"
-
-
-def _nearest(row: dict[str, Any]) -> str:
-    near = row["nearest_false_trip"]
-    if near is None:
-        return ""
-    name = DrawClass[near["class"].upper()].words
-    return (
-        f"<p><b>Nearest false trip</b> in training: {escape(name)}, at factor "
-        f"{near['factor']:.2f}; scenario <code>{escape(near['scenario'])}</code>.</p>"
     )

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...detector.criteria import Reason
 from ...optimise.certificate import two_sided
 from ...optimise.staircase import Front, border
 from ..run.along import path_starts
 from ..run.cases import Case
 from ..run.certify import Validation
 from ..run.classes import REPORTED, DrawClass, reported_row
+from ..run.status import window_of
 from ..run.tally import PLACES
 from .sheet import terminal_name
 
@@ -52,11 +54,11 @@ class Family(StrEnum):
     INSIDE = "break inside: must trip"
     OUTSIDE = "break elsewhere"
     LOAD = "load, capacitor or motor step"
-    SOURCE = "source step or regulator tap"
+    SOURCE = "source step, regulator tap"
     FAULT = "fault"
-    SWITCHING = "tie switching, transfer, energisation, reclosing"
+    SWITCHING = "switching, energisation"
     DER = "DER trip or ramp"
-    PAIR = "two at once"
+    PAIR = "two events at once"
 
 
 FAMILY = {
@@ -89,7 +91,8 @@ class Cloud:
     family: Family
     di1_a: Real
     z1_ohm: Real
-    able: NDArray[np.bool_]  #: the sign and this V_set let it trip
+    able: NDArray[np.bool_]  #: by its positive sequence it can trip, at this V_set
+    trips: NDArray[np.bool_]  #: the setting trips, by whatever sequence or phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -98,13 +101,14 @@ class EvidenceView:
 
     terminal: str
     v_set_pu: float
-    negative_sign: bool
     clouds: tuple[Cloud, ...]
     border: tuple[Real, Real] | None  #: of the settings that trip falsely; None: no training
     margin_border: tuple[Real, Real] | None  #: of those that do not keep the demanded margin
     margin: float
     chosen: Setting | None
+    word: str  #: what the setting is called
     reference: Setting
+    window_ohm: tuple[float, float] | None  #: of Z_set in a closed loop; None: no loop, or empty
     device_a: tuple[float, float]  #: smallest and largest I_set
     device_ohm: tuple[float, float]
     limits_a: tuple[float, float]  #: of the axes; events beyond are moved to the edge
@@ -166,19 +170,20 @@ def evidence_view(
         )
     v_set_pu = (chosen or reference).v_set_pu
     i_grid, z_grid = study.device.i_grid(), study.device.z_grid()
-    clouds = _clouds(validation, t, v_set_pu, study.detector.negative_sign)
+    clouds = _clouds(validation, t, v_set_pu)
     largest = max((float(c.di1_a.max()) for c in clouds if c.di1_a.size), default=0.0)
-    margin = study.certificate.margin
+    margin, window = study.certificate.margin, window_of(case, t)
     return EvidenceView(
-        terminal=case.points.terminals[t].name,
+        terminal=_name(case, t),
         v_set_pu=v_set_pu,
-        negative_sign=study.detector.negative_sign,
         clouds=clouds,
         border=None if front is None else border(front, v_set_pu),
         margin_border=None if front is None else border(front, v_set_pu, margin),
         margin=margin,
         chosen=chosen,
+        word="chosen" if front is not None else "assessed",
         reference=reference,
+        window_ohm=(window.low_ohm, window.high_ohm) if window and not window.empty else None,
         device_a=(i_grid[0], i_grid[-1]),
         device_ohm=(z_grid[0], z_grid[-1]),
         limits_a=(0.5 * i_grid[0], 1.5 * max(i_grid[-1], largest)),
@@ -186,9 +191,13 @@ def evidence_view(
     )
 
 
-def _clouds(
-    validation: Validation, t: int, v_set_pu: float, negative_sign: bool
-) -> tuple[Cloud, ...]:
+def _name(case: Case, t: int) -> str:
+    """A terminal in titles, with its setting group where the study has several."""
+    name = case.points.terminals[t].name
+    return f"{name}, {case.group.name}" if len(case.study.setting_groups()) > 1 else name
+
+
+def _clouds(validation: Validation, t: int, v_set_pu: float) -> tuple[Cloud, ...]:
     """The kept sample of terminal ``t`` by family, what must trip last, on top."""
     found: defaultdict[Family, list[Real]] = defaultdict(list)
     for which, sample, side in validation.samples:
@@ -200,20 +209,17 @@ def _clouds(
                 found[family].append(sample[t][:, rows == r])
     clouds = []
     for family in (*list(Family)[1:], Family.INSIDE):
-        parts = found[family]
-        di1_a, dv1_pu, real, imag = np.concatenate([np.empty((4, 0)), *parts], axis=1)
-        able = (dv1_pu <= v_set_pu) & ((real != 0.0) | (imag != 0.0))
-        if negative_sign:
-            able &= real < 0.0
-        if di1_a.size:
-            clouds.append(
-                Cloud(
-                    family=family,
-                    di1_a=di1_a,
-                    z1_ohm=np.hypot(real, imag),
-                    able=able,
-                )
-            )
+        if not found[family]:
+            continue
+        di1_a, dv1_pu, z1_ohm, reach_ohm, reason = np.concatenate(found[family], axis=1)
+        cloud = Cloud(
+            family=family,
+            di1_a=di1_a,
+            z1_ohm=z1_ohm,
+            able=(dv1_pu <= v_set_pu) & (reach_ohm > 0),
+            trips=reason == Reason.TRIP,
+        )
+        clouds.append(cloud)
     return tuple(clouds)
 
 
@@ -227,7 +233,7 @@ def profile_view(case: Case, t: int, validation: Validation) -> ProfileView:
     share = np.full(PLACES, np.nan)
     np.divide(counts[:, 1], counts[:, 0], out=share, where=drawn)
     return ProfileView(
-        terminal=terminal.name,
+        terminal=_name(case, t),
         local=terminal.local,
         remote=terminal.remote,
         confidence=confidence,

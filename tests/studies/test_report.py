@@ -13,7 +13,7 @@ from openphase.model.reading.feeder_file import feeder_from_toml, load_feeder
 from openphase.optimise.staircase import border, front_of
 from openphase.studies.run.session import Demand
 from openphase.studies.run.store import RunFolder
-from openphase.studies.show import figures, plots, views
+from openphase.studies.show import feeder_plot, figures, plots, views
 from openphase.studies.show.feeder_layout import lay_out
 from openphase.studies.show.report import STATUS, report_html, write_report
 from openphase.studies.sizing import size_feeder
@@ -118,7 +118,7 @@ def all_views(sizing):
         yield plots.plot_evidence, views.evidence_view(case, t, row, front, validation)
         yield plots.plot_profile, views.profile_view(case, t, validation)
     yield plots.plot_overview, views.overview_view(sizing.result)
-    yield plots.plot_feeder, case.feeder
+    yield feeder_plot.plot_feeder, case.feeder
 
 
 # ---- the page ----
@@ -374,13 +374,17 @@ def test_a_fork_gives_the_longest_way_the_row_and_sections_share_a_line():
     assert (wires["B-C"].start_km, wires["B-C"].stop_km) == (2.0, 2.0)
     # at a quarter from B, which is the far end
     assert [(u.km, u.row) for u in layout.units] == [(1.5, 0)]
-    assert figures.png_of(plots.plot_feeder, feeder) == figures.png_of(plots.plot_feeder, feeder)
+    assert figures.png_of(feeder_plot.plot_feeder, feeder) == figures.png_of(
+        feeder_plot.plot_feeder, feeder
+    )
 
 
 def test_a_figure_is_saved_as_its_name_says(tmp_path):
-    figure = plots.plot_feeder(load_feeder("paper")).get_figure()
+    figure = feeder_plot.plot_feeder(load_feeder("paper")).get_figure()
     figures.save_figure(figure, tmp_path / "a.svg")
-    figures.save_figure(plots.plot_feeder(load_feeder("paper")).get_figure(), tmp_path / "b.svg")
+    figures.save_figure(
+        feeder_plot.plot_feeder(load_feeder("paper")).get_figure(), tmp_path / "b.svg"
+    )
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
     figures.save_figure(figure, tmp_path / "a.PNG")
     assert (tmp_path / "a.PNG").read_bytes().startswith(b"\x89PNG")
