@@ -20,7 +20,8 @@ from openphase.model.distributions import Choices, Fixed
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
 from openphase.model.parts import Feeder
-from openphase.model.points import Side, find_points
+from openphase.model.points import find_points
+from openphase.model.sides import Side
 from openphase.model.solver.breaks import DEAD, FLOATING
 from openphase.model.states import NOT_CONVERGED
 from openphase.studies.run.cases import Wired
