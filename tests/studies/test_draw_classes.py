@@ -16,6 +16,7 @@ from scipy.stats import spearmanr
 
 from openphase.detector.criteria import Reason, Settings, verdict
 from openphase.detector.instruments import Wiring
+from openphase.model import load_feeder
 from openphase.model.distributions import Choices, Fixed
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
@@ -28,7 +29,7 @@ from openphase.studies.run.classes import REPORTED, DrawClass, Purpose, reported
 from openphase.studies.run.draw import BlockId, Case, Scenarios, draw_scenarios, make_cases
 from openphase.studies.run.engine import Observed, observe, options_of
 from openphase.studies.spec.parts import UNKNOWN_CONNECTION
-from openphase.studies.spec.study_file import DerDraw
+from openphase.studies.spec.study_file import DerDraw, default_study
 
 SIZE = 200
 MANY = 4000
@@ -37,6 +38,13 @@ NETWORK = (
     DrawClass.TIE_SWITCHING,
     DrawClass.TRANSFER,
     DrawClass.DER_RAMP,
+)
+#: what the paper's feeder lacks
+NEEDING_MORE = (
+    DrawClass.REGULATOR_TAP,
+    DrawClass.DER_TRIP,
+    DrawClass.DER_RAMP,
+    DrawClass.OPEN_WITH_DER_TRIP,
 )
 #: some of these stand at the source bus, where no line leads
 AT_DER = (DrawClass.DER_TRIP,)
@@ -93,6 +101,16 @@ def test_nothing_is_quietly_no_number(wires: int, group: int, drawn: DrawClass) 
     lost = found.flags & (DEAD | FLOATING) != 0
     opens_all = scenarios.event.open_after | scenarios.event.open_before
     assert not lost[opens_all != 0b111].any()
+
+
+@pytest.mark.parametrize("drawn", [own for own in DrawClass if own not in NEEDING_MORE])
+def test_a_feeder_without_loads_is_solved_too(drawn: DrawClass) -> None:
+    feeder = replace(load_feeder("paper"), loads=())
+    case = make_cases(feeder, default_study("paper"))[0]
+    found = observe(case, draw_scenarios(case, block(case, drawn), 20))
+    assert not (found.flags & NOT_CONVERGED).any()
+    assert np.isfinite(found.evidence.di_a).all()
+    assert np.isfinite(found.evidence.z_ohm).all()
 
 
 @pytest.mark.parametrize(
