@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from oracles.random_feeders import random_feeder
 from oracles.walks import side_of, without_source
-from oracles.whole import UNKNOWN, whole_feeder, whole_study
+from oracles.whole import UNKNOWN, any_model, whole_feeder, whole_study
 from scipy.stats import spearmanr
 
 from openphase.detector.criteria import Reason, Settings, verdict
@@ -20,7 +20,6 @@ from openphase.model import load_feeder
 from openphase.model.distributions import Choices, Fixed
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
-from openphase.model.parts import Feeder
 from openphase.model.points import Side, find_points
 from openphase.model.solver.breaks import DEAD, FLOATING
 from openphase.model.states import NOT_CONVERGED
@@ -245,13 +244,6 @@ def test_the_study_s_own_law_of_unknown_connections_is_taken() -> None:
     connection = many(case).before.connection[case.network.units.index("T2")]
     assert_share(int((connection == CONNECTIONS["D/D"]).sum()), 0.25)
     assert set(connection) == {CONNECTIONS["D/D"], CONNECTIONS["Y/D"]}
-
-
-def any_model(feeder: Feeder) -> Feeder:
-    """``feeder`` with DER of which all models have what they stand on."""
-    z = 1.0 + 12.0j
-    ders = tuple(replace(der, model="generator", z1_ohm=z, z2_ohm=z) for der in feeder.ders)
-    return replace(feeder, ders=ders)
 
 
 def test_der_models_are_drawn_by_their_weights() -> None:
