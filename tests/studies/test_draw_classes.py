@@ -112,11 +112,7 @@ def test_a_feeder_without_loads_is_solved_too(drawn: DrawClass) -> None:
     assert np.isfinite(found.evidence.z_ohm).all()
 
 
-@pytest.mark.parametrize(
-    ("wires", "group", "drawn"),
-    # of wrong wiring the side is that of its point
-    [own for own in EVERYTHING if own[2] != DrawClass.WIRING],
-)
+@pytest.mark.parametrize(("wires", "group", "drawn"), EVERYTHING)
 def test_sides_are_those_of_the_taken_apart_feeder(
     wires: int, group: int, drawn: DrawClass
 ) -> None:

@@ -385,11 +385,19 @@ def test_judged_blocks_add_up(kind: str, drawn: DrawClass) -> None:
     bits = [int((known.flags & bit != 0).sum()) for bit in (DEAD, FLOATING, NOT_CONVERGED)]
     assert tested.flags.tolist() == bits
     assert not tested.trips[1].any()  # no setting never trips
+    np.testing.assert_array_equal(tested.sample_side, known.side[:, : tested.sample.shape[-1]])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pictures_show_the_first_events_by_the_setting_s_own_options(kind: str) -> None:
+    tested, known = judged_of(kind, DrawClass.OPEN_PHASE)
     kept = tested.sample.shape[-1]
-    evidence = known.evidence
-    parts = (evidence.di1_a, evidence.dv1_pu, evidence.z1_ohm.real, evidence.z1_ohm.imag)
-    np.testing.assert_array_equal(tested.sample, np.stack([x[:, :kept] for x in parts], axis=1))
-    np.testing.assert_array_equal(tested.sample_side, known.side[:, :kept])
+    for t, (one, *_) in enumerate(chosen_of(kind)):
+        reach = reach_of(known.evidence, one.options if one else Options(fallback=False))
+        reason = np.full(SIZE, Reason.BLOCKED) if one is None else verdict(known.evidence, one)[t]
+        size = np.abs(known.evidence.z1_ohm[t])
+        rows = (reach.di_a[t, 0], reach.dv_pu[t, 0], size, reach.z_ohm[t, 0], reason)
+        np.testing.assert_array_equal(tested.sample[t], np.stack(rows)[:, :kept])
 
 
 def test_alarms_are_for_wrong_wiring() -> None:
