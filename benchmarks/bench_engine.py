@@ -14,6 +14,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import textwrap
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -176,7 +177,7 @@ def _print_engine(engine: Result) -> None:
     print(
         f"The engine on the paper's feeder: {count:,} scenarios, one process, median of {REPEATS}"
     )
-    print(f"({mix})\n")
+    print(textwrap.fill(f"({mix})", 100) + "\n")
     columns = list(engine.values())
     print(_row("seconds per 10⁶ scenarios", [TITLES[loads] for loads in engine]))
     for part in PARTS:

@@ -51,15 +51,15 @@ def main() -> None:
             for margin in MARGINS:
                 demand = replace(study.certificate, margin=margin)
                 own = make_case(feeder, replace(study, certificate=demand))
-                chosen = choices(own, own.grid, training)
-                ways.append([as_settings(own, pair[0]) for pair in chosen])
+                (chosen,) = choices([own], [training])
+                ways.append([as_settings(study, one.best) if one else None for one in chosen])
         settings = tuple(zip(*ways, strict=True))
         blocks = planned_blocks(case, Purpose.VALIDATE, attempt(1, VALIDATION))
         compute = functools.partial(judge_block, case, settings=settings)
         tested = run_blocks(compute, Tested, blocks, RunFolder(Path(scratch)), 2, "validation")
         total = add_up(tested, BLOCK)
     must_not = [r for r, own in enumerate(REPORTED) if own.kind == "must_not_trip"]
-    judged = [t for t, terminal in enumerate(case.points.terminals) if not terminal.load_side]
+    judged = np.flatnonzero(case.judged)
     false = total.trips[:, must_not][:, :, judged].sum(axis=1)
     found = total.found[:, judged] / total.reachable[judged]
     shape = (len(SEEDS), len(MARGINS), len(judged))

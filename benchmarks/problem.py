@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openphase.model import load_feeder
+from openphase.model.distributions import Fixed
 from openphase.model.network import Network
 from openphase.model.points import point_probes
 from openphase.model.solve import all_probes, solve
@@ -63,10 +64,12 @@ def paper_case(sampled: bool) -> Case:
 
 
 def _constant_impedance(study: Study) -> Study:
+    two = Fixed(value=2.0)
+    step = replace(study.events.load_step, exponent=two)
     return replace(
         study,
-        loads=replace(study.loads, exponent=(2.0, 2.0), exponent_spread=0.0),
-        load_step=replace(study.load_step, exponent=(2.0, 2.0)),
+        loads=replace(study.loads, exponent=two, exponent_spread=0.0),
+        events=replace(study.events, load_step=step),
     )
 
 

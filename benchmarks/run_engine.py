@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from problem import paper_case
 
-from openphase.detector.criteria import Reason, Settings, verdict
+from openphase.detector.criteria import Reason, verdict
 from openphase.model.states import Answer
 from openphase.studies.run import draw, engine
-from openphase.studies.run.choose import planned_blocks
+from openphase.studies.run.choose import planned_blocks, reference_settings
 from openphase.studies.run.classes import DrawClass, Purpose
 from openphase.studies.run.ledger import Attempt
 
@@ -78,7 +78,7 @@ def main() -> None:
     parser.add_argument("scenarios", type=int)
     asked = parser.parse_args()
     case = paper_case(sampled=asked.loads == "sampled")
-    _run(case, [_block_id(drawn, 0, Purpose.TRAIN) for drawn in DrawClass])  # compiles
+    _run(case, [_block_id(drawn, 0, Purpose.TRAIN) for drawn in case.drawn])  # compiles
     json.dump(_run(case, _mix(case, asked.scenarios)), sys.stdout)
 
 
@@ -86,14 +86,18 @@ def _run(case: draw.Case, mix: list[draw.BlockId]) -> dict[str, Any]:
     count = len(mix) * engine.BLOCK
     watch = Stopwatch()
     trips = 0
+    settings = reference_settings(case.study)
     scenarios: draw.Scenarios | None = None
 
     def frame(args: tuple[Any, ...]) -> str:
-        is_after = scenarios is not None and args[1] is scenarios.after
-        return "solve after" if is_after else "solve before"
+        """The state after an event is a new one where DER carry something over."""
+        state = args[1]
+        a_guess = state.emf_pu.size < engine.BLOCK  # of where the solution before the event lies
+        first = a_guess or (scenarios is not None and state is scenarios.before)
+        return "solve before" if first else "solve after"
 
     with (
-        watch.inside(draw, "disc_noise", lambda _: "noise"),
+        watch.inside(draw, "draw_errors", lambda _: "noise"),
         watch.inside(engine, "solve", frame),
     ):
         start = perf_counter()
@@ -101,9 +105,9 @@ def _run(case: draw.Case, mix: list[draw.BlockId]) -> dict[str, Any]:
             watch.turn_to("draw")
             scenarios = draw.draw_scenarios(case, which, engine.BLOCK)
             watch.turn_to("measure + evidence")
-            seen = engine.observe(case, scenarios)
+            seen = engine.observe(case, scenarios, settings.options)
             watch.turn_to("verdict")
-            trips += int((verdict(seen.evidence, _settings(case)) == Reason.TRIP).sum())
+            trips += int((verdict(seen.evidence, settings) == Reason.TRIP).sum())
         watch.turn_to("loop")
         total = perf_counter() - start
     return {
@@ -133,17 +137,6 @@ def _mix(case: draw.Case, scenarios: int) -> list[draw.BlockId]:
 
 def _block_id(drawn: DrawClass, block: int, purpose: Purpose) -> draw.BlockId:
     return draw.BlockId(seed=SEED, purpose=purpose, attempt=1, drawn=drawn, block=block)
-
-
-def _settings(case: draw.Case) -> Settings:
-    """The study's reference settings, for every directed terminal."""
-    reference = case.study.reference
-    return Settings(
-        i_set_a=reference.i_set_a,
-        v_set_pu=reference.v_set_pct / 100.0,
-        z_set_ohm=reference.z_set_ohm,
-        negative_sign=case.study.detector.negative_sign,
-    )
 
 
 def _peak_mb() -> float:

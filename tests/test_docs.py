@@ -29,6 +29,22 @@ def broken_links(page: Path) -> list[str]:
     return [file for file in files if file and not (page.parent / file).exists()]
 
 
+def anchors(page: Path) -> set[str]:
+    """What a link may name behind ``#``: the headings, as GitHub writes them."""
+    heads = re.findall(r"^#+ (.+)$", prose(page.read_text(encoding="utf-8")), flags=re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+def broken_anchors(page: Path) -> list[str]:
+    """Return the links of a page to headings that are not there."""
+    links = re.findall(r"\]\(([^)\s#:]*)#([^)\s]+)\)", prose(page.read_text(encoding="utf-8")))
+    return [
+        f"{file}#{name}"
+        for file, name in links
+        if name not in anchors(page.parent / file if file else page)
+    ]
+
+
 def named_targets(text: str) -> set[str]:
     """Return the targets in the page's ``make TARGET`` commands, in backquotes or indented."""
     inline = re.findall(r"`([^`\n]+)`", text)
@@ -67,6 +83,17 @@ def test_the_examples_of_feeder_and_study_go_together(
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_relative_links_lead_to_files(page: Path) -> None:
     assert broken_links(page) == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_into_pages_lead_to_headings(page: Path) -> None:
+    assert broken_anchors(page) == []
+
+
+def test_a_link_to_no_heading_is_seen(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("# `[[a]]` b\n[x](#a-b) [y](page.md#a-b) [z](#c)\n", encoding="utf-8")
+    assert broken_anchors(page) == ["#c"]
 
 
 def test_a_link_to_nothing_is_seen(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from openphase.detector.criteria import Options, Reason
 from openphase.detector.instruments import Wiring
 from openphase.model import load_feeder
 from openphase.studies import assessing, cli, sizing
-from openphase.studies.run.cases import make_case
+from openphase.studies.run.cases import make_case, make_cases
 from openphase.studies.run.classes import REPORTED
 from openphase.studies.run.status import window_of
 from openphase.studies.spec.events import WIRING_KINDS
@@ -236,6 +236,16 @@ def test_the_exit_codes_are_those_of_help(capsys: pytest.CaptureFixture[str]) ->
         cli.main(["--help"])
     helped = re.findall(r"^  (\d)  ", capsys.readouterr().out, flags=re.MULTILINE)
     assert [row[0] for row in rows(RESULTS, "Exit codes")] == helped
+
+
+def test_the_terminals_of_each_group_of_the_example_are_the_code_s() -> None:
+    example = section(RESULTS, "Setting groups").partition("```toml\n")[2].partition("```")[0]
+    cases = make_cases(load_feeder("paper"), study_from_toml(example, "study.toml"))
+    found = [
+        [case.group.name, ", ".join(t.name for t in case.points.terminals if not t.load_side)]
+        for case in cases
+    ]
+    assert rows(RESULTS, "Setting groups") == found
 
 
 def test_the_windows_of_the_paper_s_loop_are_the_code_s() -> None:

@@ -67,22 +67,6 @@ def alpha_of(cases: Sequence[Case], attempt: int) -> float:
     return share_of_alpha(confidence, attempt, judged_pairs(cases))
 
 
-def sheets_of(
-    cases: Sequence[Case], validations: Sequence[Validation], attempt: int, chosen: bool
-) -> list[Sheet]:
-    """A sheet for each group; the settings were ``chosen`` for this validation, or given."""
-    return [
-        Sheet(
-            case=case,
-            validation=own,
-            alpha=alpha_of(cases, attempt),
-            attempt=attempt,
-            chosen=chosen,
-        )
-        for case, own in zip(cases, validations, strict=True)
-    ]
-
-
 def not_covered(validations: Sequence[Validation]) -> list[str]:
     """What the bounds say nothing about, classes that were never drawn among them."""
     drawn = np.any([own.trials.any(axis=1) for own in validations], axis=0)
@@ -121,6 +105,22 @@ class Sheet:
     alpha: float
     attempt: int
     chosen: bool  #: the settings were chosen for this validation, which may be used up thereby
+
+
+def sheets_of(
+    cases: Sequence[Case], validations: Sequence[Validation], attempt: int, chosen: bool
+) -> list[Sheet]:
+    """A sheet for each group; the settings were ``chosen`` for this validation, or given."""
+    return [
+        Sheet(
+            case=case,
+            validation=own,
+            alpha=alpha_of(cases, attempt),
+            attempt=attempt,
+            chosen=chosen,
+        )
+        for case, own in zip(cases, validations, strict=True)
+    ]
 
 
 def section_row(sheet: Sheet, t: int, given: Given) -> dict[str, Any]:

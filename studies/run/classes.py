@@ -122,6 +122,8 @@ class ReportedClass:
         """The class and its side in a reader's words, in the plural."""
         if self.name == "open_lateral":
             return "breaks on laterals inside"
+        if self.drawn == DrawClass.WIRING:
+            return f"{self.drawn.words} of {'its own' if self.side == 'inside' else 'other'} points"
         return f"{self.drawn.words}{_AT_SIDE[self.side]}"
 
 
@@ -175,6 +177,8 @@ def _reported() -> Iterator[ReportedClass]:
         inside: Kind = "apart" if drawn in (*APART, *COINCIDENT) else "must_not_trip"
         yield row(name, inside, "inside", drawn, INSIDE)
         for side, where in OUTSIDE:
+            if drawn == DrawClass.WIRING and side != "other":
+                continue  # at one of the terminal's own points, or at another
             yield row(name, "apart" if drawn in APART else "must_not_trip", side, drawn, where)
 
 

@@ -22,7 +22,7 @@ __all__ = ["Pairs", "Run", "differences", "pair_runs", "read_run"]
 
 #: what two runs must have in common to have drawn the same scenarios with the same code
 SAME = {
-    "population_sha256": "feeder, and what the study draws",
+    "population_sha256": "population",
     "seed": "seed",
     "attempt": "attempt",
     "scenarios": "scenarios",
@@ -80,7 +80,12 @@ def read_run(path: Path) -> Run:
 def differences(a: Run, b: Run) -> list[Fault]:
     """Everything that keeps two runs from being compared; empty where nothing does."""
     faults = [
-        _fault(b, what, f"must be as in {a.path}, {_short(a.manifest[key])}", b.manifest[key])
+        _fault(
+            b,
+            _population(a, b) if key == "population_sha256" else what,
+            f"must be as in {a.path}, {_short(a.manifest[key])}",
+            b.manifest[key],
+        )
         for key, what in SAME.items()
         if a.manifest[key] != b.manifest[key]
     ]
@@ -98,6 +103,13 @@ def differences(a: Run, b: Run) -> list[Fault]:
         wanted = "must be there in both; the command of a run, given again, fills it in"
         faults.append(_fault(b, where, wanted))
     return faults
+
+
+def _population(a: Run, b: Run) -> str:
+    """Which of the two things that decide what is drawn is another one."""
+    names = {"feeder_sha256": "feeder", "study_sha256": "what the study draws"}
+    other = [name for key, name in names.items() if a.manifest.get(key) != b.manifest.get(key)]
+    return " and ".join(other) or "population"
 
 
 def _terminal(row: dict[str, Any]) -> str:

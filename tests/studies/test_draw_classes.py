@@ -120,6 +120,10 @@ def test_sides_are_those_of_the_taken_apart_feeder(
             continue
         line, _ = case.network.line_fraction(edge, share)
         wanted = np.repeat([sides[s, line] for s in range(len(case.feeder.sections))], 2)
+        if drawn == DrawClass.WIRING:  # stands where the wrong point is, and not where the load is
+            wrong = case.points.names[scenarios.miswired[0][n]]
+            own = [wrong in (section.local, section.remote) for section in case.feeder.sections]
+            wanted = np.repeat(np.where(own, Side.PATH, Side.OTHER), 2)
         np.testing.assert_array_equal(found.side[:, n], wanted)
         for row, side in zip(rows[found.side[:, n]], wanted, strict=True):
             assert row < 0 or (REPORTED[row].drawn == drawn and side in REPORTED[row].where)

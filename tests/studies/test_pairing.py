@@ -248,10 +248,11 @@ def test_everything_that_makes_runs_incomparable_is_said(home: Path, other: Path
     path = other / "manifest.json"
     manifest = json.loads(path.read_text(encoding="utf-8"))
     manifest |= {"seed": 7, "scenarios": 90, "population_sha256": "f" * 64}
+    manifest["feeder_sha256"] = "e" * 64
     path.write_text(json.dumps(manifest), encoding="utf-8")
     said = refusal(home / "a", other)
     assert said[-1] == "3 faults"
-    what = f"{other}: feeder, and what the study draws must be as in {home / 'a'}, "
+    what = f"{other}: feeder must be as in {home / 'a'}, "
     assert said[0].startswith(what)
     assert said[0].endswith("got ffffffffffff…")
     assert said[1] == f"{other}: seed must be as in {home / 'a'}, 1, got 7"
