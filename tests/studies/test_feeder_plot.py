@@ -113,7 +113,7 @@ connection = "wye"
 def test_the_legend_names_what_stands_there_and_nothing_else(more, wanted):
     feeder = feeder_from_toml(FORKED + more, "forked.toml")
     texts = [own.get_text() for own in feeder_plot.plot_feeder(feeder).get_legend().get_texts()]
-    assert texts == ["section P–Q", "section P–R", "measuring point", wanted]
+    assert texts == ["section P–Q", "section P–R", "measuring point", wanted, "closed switch"]
 
 
 def test_the_papers_legend_has_its_tie():

@@ -13,6 +13,7 @@ from openphase.studies.show import views
 from openphase.studies.show.by_class import worst_first
 from openphase.studies.show.report import STATUS, report_html, write_report
 from openphase.studies.show.sheet import class_words
+from openphase.studies.spec.study_file import dump_study
 
 
 @pytest.fixture(scope="module")
@@ -300,3 +301,19 @@ def test_classes_are_ordered_by_rate_then_by_bound_the_told_apart_last(assessed)
         own = [x for x in ordered if x["kind"] == "must_not_trip"]
         keys = [(x["trips"] / x["trials"], x["upper"]) for x in own]
         assert keys == sorted(keys, reverse=True)
+
+
+# ---- what it rests on ----
+
+
+def test_every_value_of_the_study_stands_in_full(grouped):
+    study = grouped.cases[0].study
+    page = page_of(grouped)
+    lines = escape(dump_study(study)).splitlines()
+    left_out = [f"[events.{name}]" for name in study.events.without]
+    table = ""
+    for line in filter(None, lines[1:]):
+        table = line if line.startswith("[") else table
+        if table not in left_out and line != table:
+            assert line in page
+            assert table in page
