@@ -14,8 +14,8 @@ STATED = (
     "Two steady states of the feeder, ΔT apart, with one event between them. Every scenario draws "
     "all loads, what is unknown of the transformers, DER and motors afresh, and small changes of "
     "the source and of each load, whatever the event.",
-    "Breaks of one, two or all three conductors are uniform in length over all lines; other events pick a section first, every one "
-    "equally likely, then a place uniform in length.",
+    "Breaks of one, two or all three conductors are uniform in length over all lines; other "
+    "events pick a section first, every one equally likely, then a place uniform in length.",
     "Below 0.7 pu all loads are constant impedance.",
     "Random errors are complex, per phase, channel and frame: normal with a standard deviation of "
     "a third of their bound per axis, truncated at the bound. Ratio, angle and clock errors are "
