@@ -5,10 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from ...model.reading.fields import as_toml
-from ..spec.fields import TABLES, part_of
-from ..spec.study_file import Study
-from ..spec.values import as_table
+from ..spec.study_file import Study, dump_study
 from .html_parts import bullets, table
 
 __all__ = ["assumptions"]
@@ -17,8 +14,8 @@ STATED = (
     "Two steady states of the feeder, ΔT apart, with one event between them. Every scenario draws "
     "all loads, what is unknown of the transformers, DER and motors afresh, and small changes of "
     "the source and of each load, whatever the event.",
-    "Breaks are uniform in length over all lines; other events pick a section first, every one "
-    "equally likely, then a place uniform in length.",
+    "Breaks of one, two or all three conductors are uniform in length over all lines; other "
+    "events pick a section first, every one equally likely, then a place uniform in length.",
     "Below 0.7 pu all loads are constant impedance.",
     "Random errors are complex, per phase, channel and frame: normal with a standard deviation of "
     "a third of their bound per axis, truncated at the bound. Ratio, angle and clock errors are "
@@ -45,23 +42,12 @@ def assumptions(result: dict[str, Any], study: Study) -> str:
 
 
 def _laws(study: Study, drawn: set[str]) -> str:
-    """A row for each table of the study; events that were not drawn are left out."""
+    """A row for each table of the study; empty ones and events that were not drawn are left out."""
     rows = []
-    for name, fields in TABLES.items():
-        event = name.partition("events.")[2]
-        if event and event != "open_phase" and event not in drawn:
-            continue
-        values = as_table(part_of(study, name))
-        said = [f"{own.name} = {as_toml(values[own.name])}" for own in fields if own.name in values]
-        if said:
-            rows.append(_row(name, said))
-    for name, items in (("groups", study.groups), ("correlations", study.correlations)):
-        for item in items:
-            values = as_table(item)
-            rows.append(_row(name, [f"{key} = {as_toml(value)}" for key, value in values.items()]))
+    for text in dump_study(study).split("\n\n")[1:]:
+        head, *lines = text.splitlines()
+        event = head.strip("[]").partition("events.")[2]
+        if lines and (not event or event == "open_phase" or event in drawn):
+            cells = f'<th class="w">{escape(head)}</th>'
+            rows.append(f"{cells}<td>{'<br>'.join(escape(line) for line in lines)}</td>")
     return table(("table", "values"), rows)
-
-
-def _row(name: str, said: list[str]) -> str:
-    cells = f'<th class="w">[{escape(name)}]</th>'
-    return f"{cells}<td>{'<br>'.join(escape(text) for text in said)}</td>"

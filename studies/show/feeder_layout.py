@@ -54,6 +54,7 @@ class FeederLayout:
     wires: tuple[Wire, ...]
     units: tuple[Mark, ...]  #: transformers, and all else that stands on the feeder
     kinds: tuple[str, ...]  #: what they are
+    joints: tuple[str, ...]  #: what joins two buses without any length
     points: tuple[Mark, ...]
     ties: tuple[Tie, ...]
     reach_km: float
@@ -77,6 +78,7 @@ def lay_out(feeder: Feeder) -> FeederLayout:
         wires=wires,
         units=_units(feeder, by_line, km, row),
         kinds=_kinds(feeder),
+        joints=_joints(feeder),
         points=tuple(
             Mark(
                 text=p.name, km=_beside(by_line[p.line], km[p.bus], reach), row=by_line[p.line].row
@@ -190,6 +192,13 @@ def _kinds(feeder: Feeder) -> tuple[str, ...]:
         "capacitor": bool(feeder.capacitors),
         "regulator": bool(feeder.regulators),
     }
+    return tuple(kind for kind, stands in there.items() if stands)
+
+
+def _joints(feeder: Feeder) -> tuple[str, ...]:
+    """What the squares within the wires are."""
+    closed = any(switch.closed for switch in feeder.switches)
+    there = {"closed switch": closed, "regulator": bool(feeder.regulators)}
     return tuple(kind for kind, stands in there.items() if stands)
 
 

@@ -64,10 +64,12 @@ def _legend(layout: FeederLayout) -> list[Line2D]:
     ]
     ring = Line2D([], [], ls="", marker="o", color="white", mec="black", ms=7)
     unit = Line2D([], [], ls="", marker="^", color="black", ms=6)
+    joint = Line2D([], [], ls="", marker="s", color="black", ms=6)
     tie = Line2D([], [], ls="--", marker="s", color="black", mfc="white", ms=7)
     said = (
         (ring, "measuring point" if layout.points else ""),
         (unit, " or ".join(filter(None, [", ".join(layout.kinds[:-1]), *layout.kinds[-1:]]))),
+        (joint, " or ".join(layout.joints)),
         (tie, "open switch" if layout.ties else ""),
     )
     for handle, text in said:

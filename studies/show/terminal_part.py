@@ -102,7 +102,8 @@ def _classes(row: Row) -> str:
             table(HEAD, [_class_row(own) for own in classes]),
         )
         + '<p class="faint">Effective trials come near the thresholds: |ΔI1| > I_set/2 and '
-        "|ΔV1| ≤ V_set. Where they are few, no trips show little.</p>"
+        "|ΔV1| ≤ V_set. Where they are few, no trips show little; what comes near by its phases "
+        "alone is not among them.</p>"
     )
 
 
