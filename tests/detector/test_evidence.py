@@ -45,7 +45,8 @@ def terminal(local: int, remote: int, into: float = 1.0) -> Terminal:
         load_side=False,
         line_z1_ohm=0j,
         loop_z1_ohm=None,
-        side=np.zeros(0, np.int8),
+        edge_side=np.zeros(0, np.int8),
+        node_side=np.zeros(1, np.int8),
     )
 
 

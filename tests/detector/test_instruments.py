@@ -228,7 +228,8 @@ def both_ways() -> tuple[Terminal, Terminal]:
     one = Terminal(
         local="L", remote="R", local_point=0, remote_point=1, into=1.0, on_path=empty,
         in_section=empty, load_side=False, line_z1_ohm=0j, loop_z1_ohm=None,
-        side=np.zeros(0, np.int8),
+        edge_side=np.zeros(0, np.int8),
+        node_side=np.zeros(1, np.int8),
     )  # fmt: skip
     other = replace(one, local="R", remote="L", local_point=1, remote_point=0)
     return one, other

@@ -1,25 +1,26 @@
-"""How a line lies to a section, by taking the feeder apart: slow, and easy to believe."""
+"""How things lie to a section, by taking the feeder apart: slow, and easy to believe."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 from openphase.model.parts import Feeder, Section
 from openphase.model.sides import Side
 
-__all__ = ["side_of", "without_source"]
+__all__ = ["in_state", "side_of", "without_source"]
 
 Thing = tuple[str, str]
 """What can be reached: a ("bus", name), or a ("line", name), switch or regulator."""
 
 
-def side_of(feeder: Feeder, section: Section, line: str) -> Side:
-    """The Side of ``line``, in the feeder's normal state, which must be a tree."""
+def side_of(feeder: Feeder, section: Section, own: Thing) -> Side:
+    """The Side of a bus, line, switch or regulator in the feeder's normal state, a tree."""
     points = {point.name: point for point in feeder.points}
     local, remote = (("bus", points[name].bus) for name in (section.local, section.remote))
     lines: list[Thing] = [("line", own.name) for own in feeder.lines]
     path = [own for own in lines if remote not in _reached(feeder, local, [own])]
-    own, source = ("line", line), ("bus", feeder.source.bus)
+    source = ("bus", feeder.source.bus)
     if own in path:
         return Side.PATH
     # parted from its bus wherever a point measures what flows into it
@@ -33,6 +34,26 @@ def side_of(feeder: Feeder, section: Section, line: str) -> Side:
     if any(own in _reached(feeder, part, head) for part in path):
         return Side.UPSTREAM
     return Side.OTHER
+
+
+def in_state(feeder: Feeder, closed: Collection[str], opened: Collection[str]) -> Feeder:
+    """The feeder with other switches closed, and lines taken off the bus at open reclosers."""
+    lines, points = list(feeder.lines), list(feeder.points)
+    for n, point in enumerate(points):
+        if point.name in opened:
+            k = next(k for k, line in enumerate(lines) if line.name == point.line)
+            end = f"{point.name}:open"
+            at_from = lines[k].from_bus == point.bus
+            lines[k] = (
+                replace(lines[k], from_bus=end) if at_from else replace(lines[k], to_bus=end)
+            )
+            points[n] = replace(point, bus=end)
+    return replace(
+        feeder,
+        lines=tuple(lines),
+        points=tuple(points),
+        switches=tuple(replace(own, closed=own.name in closed) for own in feeder.switches),
+    )
 
 
 def without_source(feeder: Feeder, line: str) -> set[str]:

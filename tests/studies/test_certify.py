@@ -27,7 +27,7 @@ from openphase.studies.run.certify import (
     not_covered,
     section_row,
 )
-from openphase.studies.run.classes import REPORTED, DrawClass, Purpose
+from openphase.studies.run.classes import FALLEN_OHM, REPORTED, DrawClass, Purpose
 from openphase.studies.run.draw import BlockId
 from openphase.studies.run.status import (
     loop_note,
@@ -94,6 +94,7 @@ def validation(
         effective=trials // 2,
         trips=np.zeros((WAYS, CLASSES, TERMINALS), np.int64),
         alarms=np.zeros((CLASSES, TERMINALS), np.int64),
+        fallen=np.zeros((2, len(FALLEN_OHM) - 1, TERMINALS, 2), np.int64),
         reachable=np.full(TERMINALS, reachable, np.int64),
         found=np.full((WAYS, TERMINALS), found, np.int64),
         missed=missed,

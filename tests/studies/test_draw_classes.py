@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from oracles.random_feeders import random_feeder
-from oracles.walks import side_of, without_source
+from oracles.walks import in_state, side_of, without_source
 from oracles.whole import UNKNOWN, any_model, whole_feeder, whole_study
 from scipy.stats import spearmanr
 
@@ -18,6 +18,7 @@ from openphase.detector.criteria import Reason, Settings, verdict
 from openphase.detector.instruments import Wiring
 from openphase.model import load_feeder
 from openphase.model.distributions import Choices, Fixed
+from openphase.model.events.base import Event
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
 from openphase.model.parts import Der, Load
@@ -120,28 +121,49 @@ def test_sides_are_those_of_the_taken_apart_feeder(
 ) -> None:
     case = cases(wires)[group]
     scenarios, found = seen(wires, group, drawn)
-    sides = {
-        (s, line.name): side_of(case.feeder, section, line.name)
-        for s, section in enumerate(case.feeder.sections)
-        for line in case.feeder.lines
-    }
+    group = case.study.setting_groups()[case.group.index]
+    closed = [s.name for s in case.feeder.switches if s.closed]
+    looped = case.network.has_chord  # sides of a closed loop are those of the normal state
+    own_state = in_state(
+        case.feeder,
+        closed if looped or group.closed is None else group.closed,
+        () if looped else group.opened,
+    )
+    sections = own_state.sections
     rows = reported_row(drawn)
-    for n, (edge, share) in enumerate(
-        zip(scenarios.event.edge.tolist(), scenarios.event.share.tolist(), strict=True)
-    ):
-        if edge < 0:
-            assert drawn in (*NETWORK, *AT_DER)
+    known: dict[tuple[str, str], list[Side]] = {}
+    for n in range(scenarios.event.edge.size):
+        thing = thing_of(case, scenarios.event, n)
+        if thing is None:
+            assert drawn in NETWORK
             assert (found.side[:, n] == Side.NOWHERE).all()
             continue
-        line, _ = case.network.line_fraction(edge, share)
-        wanted = np.repeat([sides[s, line] for s in range(len(case.feeder.sections))], 2)
+        if thing not in known:
+            known[thing] = [side_of(own_state, section, thing) for section in sections]
+        wanted = np.repeat(known[thing], 2)
         if drawn == DrawClass.WIRING:  # stands where the wrong point is, and not where the load is
             wrong = case.points.names[scenarios.miswired[0][n]]
             own = [wrong in (section.local, section.remote) for section in case.feeder.sections]
             wanted = np.repeat(np.where(own, Side.PATH, Side.OTHER), 2)
-        np.testing.assert_array_equal(found.side[:, n], wanted)
+        at_node = scenarios.event.at_node[n] >= 0  # a bus inside is inside, path or lateral
+        seen_side = np.where(at_node & (found.side[:, n] == Side.LATERAL), -1, found.side[:, n])
+        inside = at_node & np.isin(wanted, (Side.PATH, Side.LATERAL))
+        np.testing.assert_array_equal(seen_side, np.where(inside, -1, wanted))
         for row, side in zip(rows[found.side[:, n]], wanted, strict=True):
             assert row < 0 or (REPORTED[row].drawn == drawn and side in REPORTED[row].where)
+
+
+def thing_of(case: Case, event: Event, n: int) -> tuple[str, str] | None:
+    """What an event is at: a line, a regulator, a bus; None: nothing."""
+    network = case.network
+    if event.edge[n] >= 0:
+        return "line", network.line_fraction(int(event.edge[n]), float(event.share[n]))[0]
+    if event.at_edge[n] >= 0:
+        return "regulator", network.regulators[int(network.tree.regulator[event.at_edge[n]])]
+    if event.at_node[n] >= 0:
+        line, colon, _ = network.nodes[int(event.at_node[n])].partition(":")
+        return ("line" if colon else "bus"), line
+    return None
 
 
 def test_every_side_occurs() -> None:
@@ -158,7 +180,7 @@ def test_sides_on_random_feeders(seed: int) -> None:
     for section, terminal in zip(feeder.sections, terminals[::2], strict=True):
         for k, piece in enumerate(network.pieces):
             if piece is not None and piece.line is not None:
-                assert terminal.side[k] == side_of(feeder, section, piece.line)
+                assert terminal.edge_side[k] == side_of(feeder, section, ("line", piece.line))
 
 
 @pytest.mark.parametrize("wires", [4, 3])

@@ -224,9 +224,9 @@ def paper() -> Feeder:
             " got { first = 2, last = 1, step = 1 }",
         ),
         (
-            ("[device]", "i_set = { first = 1, last = 1e300, step = 1e-300 }"),
+            ("[device]", "i_set = { first = 1, last = 1e6, step = 1e-3 }"),
             "3: device: i_set must hold at most 10000 numbers,"
-            " got { first = 1, last = 1e+300, step = 1e-300 }",
+            " got { first = 1, last = 1000000.0, step = 0.001 }",
         ),
         (
             ("[device]", "z_set_ohm = { first = 1, last = 2, step = 1 }"),
