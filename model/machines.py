@@ -112,7 +112,7 @@ def machine_state(
     share, y2_y1 : (motors, S) arrays, optional
         Motor share and ratio of the motors' admittances; by default the file's.
     der_level : (D, S) array, optional
-        Factor on what the DER deliver; by default 1.
+        Factor on what the DER deliver; by default 1. At 0 they are disconnected.
     """
     own, v = network.machines, network.tree.v_nominal_v
     size = load_scale.shape[1]
@@ -127,8 +127,9 @@ def machine_state(
     follows[:motors] = exponent[load]
     y = np.zeros((own.count, 3, size), np.complex128)
     y[:motors, 2] = y2_y1 * va[:motors].conj() / (3.0 * v * v)
-    y[motors:, 0] = own.der_y_s[:, 0, None]
-    y[motors:, 2] = own.der_y_s[:, 2, None]
+    connected = level != 0.0
+    y[motors:, 0] = np.where(connected, own.der_y_s[:, 0, None], 0.0)
+    y[motors:, 2] = np.where(connected, own.der_y_s[:, 2, None], 0.0)
     static = load_scale.copy()
     static[load] *= 1.0 - share
     return {
@@ -168,6 +169,7 @@ def carried_over(
     ders = slice(own.motor_load.size, None)
     kind = np.tile(own.der_model[:, None], factor.shape[1]) if model is None else model
     v1 = answer.machine_v1_v[ders]
+    factor = np.where(before.machine_va[ders] == 0.0, 0.0, factor)  # not even connected
     asked = before.machine_va[ders].conj() / (3.0 * tree.v_nominal_v**2)
     current = -asked * np.maximum(np.abs(v1) / tree.v_nominal_v, FLOOR_PU) ** -2.0 * v1 * factor
     behind = np.isin(kind, (0, 1))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +10,11 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .network import Network, Piece, compile_network, detached_end
 from .parts import Feeder, Point, Section
+from .sides import sides_of
 from .states import Probes
-from .topology import Tree, edges, forest, tree_path
+from .topology import edges, forest, tree_path
 
-__all__ = ["Points", "Side", "Terminal", "find_points", "into_line", "point_probes"]
-
-
-class Side(IntEnum):
-    """How an edge lies to a section, in the feeder's normal state."""
-
-    PATH = 0  #: between the two points
-    LATERAL = 1  #: on a lateral that tees off that path
-    UPSTREAM = 2  #: on the way to it, or on what else hangs there
-    DOWNSTREAM = 3  #: fed through it
-    OTHER = 4  #: on another branch from the source bus
-    NOWHERE = 5  #: an event that stands on no edge
+__all__ = ["Points", "Terminal", "find_points", "into_line", "point_probes"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,7 +34,8 @@ class Terminal:
     load_side: bool  #: with the section cut, nothing behind the terminal could feed it
     line_z1_ohm: complex
     loop_z1_ohm: complex | None  #: of the whole closed loop that the path is part of; None: none
-    side: NDArray[np.int8]  #: (edges,) a Side: how each edge lies to the section
+    edge_side: NDArray[np.int8]  #: (edges,) a Side: how each edge lies to the section
+    node_side: NDArray[np.int8]  #: (nodes,) and each node
 
     @property
     def name(self) -> str:
@@ -121,7 +111,8 @@ def _terminals(
     on_path = _edges_of_lines(network, lines)
     in_section = on_path | _laterals(feeder, network, lines, ends)
     z1 = sum((li.z1_ohm_per_km * li.length_km for li in feeder.lines if li.name in lines), start=0j)
-    side = _side(feeder, network, tree, on_path, in_section)
+    own_ends = {point.bus for point in ends if point.line in lines}
+    edge_side, node_side = sides_of(feeder, network, on_path, in_section, own_ends)
     in_loop = np.append(network.tree.in_loop, network.has_chord)[: on_path.size]
     loop_z1 = _loop_z1(feeder, network, in_loop) if bool(in_loop[on_path].all()) else None
     return [
@@ -137,7 +128,8 @@ def _terminals(
             or not _reaches_feed(feeder, network, network.node(here.bus), in_section),
             line_z1_ohm=z1,
             loop_z1_ohm=loop_z1,
-            side=side,
+            edge_side=edge_side,
+            node_side=node_side,
         )
         for here, there in (ends, ends[::-1])
     ]
@@ -152,41 +144,6 @@ def _loop_z1(feeder: Feeder, network: Network, in_loop: NDArray[np.bool_]) -> co
         if piece is not None and piece.line is not None:
             total += piece.length_km * lines[piece.line].z1_ohm_per_km
     return total
-
-
-def _side(
-    feeder: Feeder,
-    network: Network,
-    tree: Tree,
-    on_path: NDArray[np.bool_],
-    in_section: NDArray[np.bool_],
-) -> NDArray[np.int8]:
-    """The Side of every edge, by the ways to the source in the normal state ``tree``."""
-    ways = {bus: _way(tree, bus) for bus in tree}
-    ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
-    inside = {p.line for k, p in enumerate(network.pieces) if p and on_path[k]}
-    nearest = min((ways[ends[line][0]] for line in inside if line), key=len, default=[])
-    branch = [name for name in nearest if name not in inside][:1]
-    found = np.full(on_path.size, Side.UPSTREAM, np.int8)
-    for k, piece in enumerate(network.pieces):
-        if on_path[k]:
-            found[k] = Side.PATH
-        elif in_section[k]:
-            found[k] = Side.LATERAL
-        elif piece is not None and piece.line is not None:
-            # the way through a line is that of its farther end
-            way = max((ways[bus] for bus in ends[piece.line]), key=len)
-            if inside & set(way):
-                found[k] = Side.DOWNSTREAM
-            elif way[:1] != branch:
-                found[k] = Side.OTHER
-    return found
-
-
-def _way(tree: Tree, bus: str) -> list[str]:
-    """Lines from the source to a bus."""
-    _, taken = tree_path(tree, next(iter(tree)), bus)
-    return [edge.name for edge in taken if edge.is_line]
 
 
 def _edges_of_lines(network: Network, lines: set[str]) -> NDArray[np.bool_]:

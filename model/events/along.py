@@ -1,4 +1,4 @@
-"""Nodes and places: which node is nearest to a place, and which place is a node's."""
+"""Nodes and places: which node is nearest to a place, and what hangs below it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..network import Network
 from .base import Places, draw_place
 
-__all__ = ["draw_node", "fed_through", "place_of"]
+__all__ = ["draw_node", "fed_through"]
 
 Int = NDArray[np.int64]
 
@@ -25,21 +25,6 @@ def draw_node(
     upper = np.append(tree.parent, tree.tail)[edge]
     lower = np.append(np.arange(tree.parent.size), tree.fork)[edge]
     return np.where(share < 0.5, upper, lower)
-
-
-def place_of(network: Network, node: Int) -> tuple[Int, NDArray[np.float64]]:
-    """Edges and shares of ``node`` (S,): the lower end of the line that leads to it.
-
-    Closed switches and regulators on the way up have no length and are passed over. Edge -1:
-    no line stands between the node and the source.
-    """
-    edge = node.copy()
-    passed = (edge > 0) & (network.length_km[edge] == 0.0)
-    while passed.any():
-        edge = np.where(passed, network.tree.parent[edge], edge)
-        passed = (edge > 0) & (network.length_km[edge] == 0.0)
-    edge = np.where(edge > 0, edge, -1)
-    return edge, np.where(edge > 0, 1.0, 0.0)
 
 
 def fed_through(network: Network, edge: Int, nodes: Int) -> NDArray[np.bool_]:

@@ -25,11 +25,15 @@ class Event:
     ``edge`` is -1 where the event stands nowhere on the feeder. What stands on it has two
     sides, p towards the source and q: opened phases between them, admittances to earth and
     between the phases (a-b, b-c, c-a) at p, to earth at q. Pairs have a second place, a node.
+    What equipment does by itself is ``at_edge`` (a regulator's) or ``at_node`` (a DER's), which
+    says where it happens and changes nothing.
     Admittances are siemens at nominal voltage, before the event and after it.
     """
 
     edge: Int  #: (S,)
     share: Real  #: (S,) from the edge's upper end
+    at_edge: Int  #: (S,) -1: none
+    at_node: Int  #: (S,) -1: none
     open_before: Int  #: (S,) bit a: phase a is open
     open_after: Int  #: (S,)
     earth_before_s: Complex  #: (3, S) at p
@@ -91,6 +95,8 @@ def no_event(network: Network, size: int) -> Event:
     return Event(
         edge=np.full(size, -1, np.int64),
         share=np.zeros(size),
+        at_edge=np.full(size, -1, np.int64),
+        at_node=np.full(size, -1, np.int64),
         open_before=np.zeros(size, np.int64),
         open_after=np.zeros(size, np.int64),
         earth_before_s=nothing,

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..distributions import Distribution
 from ..network import Network
-from .along import place_of
 from .base import Event, no_event
 from .der_units import draw_tripped
 
@@ -20,14 +19,11 @@ def draw_der_trip(
 ) -> Event:
     """``share`` of the DER trip, one at least.
 
-    The event stands at one of them: at the end of the line that leads to it, or nowhere if
-    none does. Raises ValueError for a network without DER.
+    It is at the node of one of them. Raises ValueError for a network without DER.
     """
     node, tripped = draw_tripped(rng, size, network, share)
-    edge, along = place_of(network, node)
     return replace(
         no_event(network, size),
-        edge=edge,
-        share=along,
+        at_node=node,
         der_factor=np.where(tripped, 0.0, 1.0),
     )

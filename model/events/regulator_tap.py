@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ..distributions import Distribution
 from ..network import Network
-from .along import place_of
 from .base import Event, no_event
 from .shunts import one_of_three
 
@@ -25,8 +24,8 @@ def draw_regulator_tap(
 ) -> Event:
     """One regulator moves by ``taps``: one phase that often, else all three alike.
 
-    Every regulator is as likely. The event stands at the end of the line that leads to it, or
-    nowhere if none does. Raises ValueError for a network without regulators.
+    Every regulator is as likely; the event is at its edge. Raises ValueError for a network
+    without regulators.
     """
     count = len(network.regulators)
     if count == 0:
@@ -35,12 +34,10 @@ def draw_regulator_tap(
     moves = taps.draw(rng, size)
     phase = one_of_three(rng, size) | (rng.random(size) >= single_phase_share)
     moved = phase & (which == np.arange(count)[:, None, None])
-    edges = [np.flatnonzero(network.tree.regulator == r)[0] for r in range(count)]
-    edge, share = place_of(network, network.tree.parent[edges][which])
+    edges = np.array([np.flatnonzero(network.tree.regulator == r)[0] for r in range(count)])
     return replace(
         no_event(network, size),
-        edge=edge,
-        share=share,
+        at_edge=edges[which],
         tap_factor=_ratio_factor(network, moved * moves),
     )
 

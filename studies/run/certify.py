@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from ...detector.criteria import Reason, Settings
 from ...optimise.certificate import share_of_alpha, two_sided, upper_bound
 from .cases import Case
-from .classes import REPORTED, DrawClass
+from .classes import FALLEN, FALLEN_OHM, REPORTED, DrawClass
 from .engine import options_of
 from .options import options_text, trigger_text
 from .status import load_side_status, status_of
@@ -234,7 +235,26 @@ def _class_row(
     }
     if reported.drawn == DrawClass.WIRING:
         row["alarms"] = int(validation.alarms[r, t])
+    if reported.drawn in FALLEN and reported.side == "inside":
+        row["by_ohm"] = _by_ohm(reported.drawn, t, own, validation)
     return row
+
+
+def _by_ohm(
+    drawn: DrawClass, t: int, own: Settings | None, validation: Validation
+) -> list[dict[str, Any]]:
+    """Fallen conductors inside by their resistance to earth."""
+    counts = validation.fallen[FALLEN.index(drawn), :, t]
+    return [
+        {
+            "ohm_from": low,
+            "ohm_to": high if math.isfinite(high) else None,
+            "trials": int(trials),
+            "trips": int(trips) if own else None,
+        }
+        for (low, high), (trials, trips) in zip(pairwise(FALLEN_OHM), counts, strict=True)
+        if trials
+    ]
 
 
 def _causes(missed: NDArray[np.int64]) -> list[dict[str, Any]]:

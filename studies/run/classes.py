@@ -10,9 +10,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.points import Side, Terminal
+from ...model.events.base import Event
+from ...model.points import Terminal
+from ...model.sides import Side
 
 __all__ = [
+    "FALLEN",
+    "FALLEN_OHM",
+    "INSIDE",
     "REPORTED",
     "DrawClass",
     "Kind",
@@ -143,16 +148,21 @@ NETWORK = (
 )
 
 #: in neither count, wherever they stand
-APART = (
-    DrawClass.OPEN_THREE,
+APART = (DrawClass.OPEN_THREE, DrawClass.WIRING)
+
+#: open phases that something else hides or imitates: inside they are in neither count, and
+#: outside they must not trip, like any open phase
+DISGUISED = (
     DrawClass.SINGLE_POLE,
     DrawClass.FALLEN_SOURCE_SIDE,
     DrawClass.FALLEN_LOAD_SIDE,
-    DrawClass.WIRING,
+    DrawClass.OPEN_WITH_LOAD_STEP,
+    DrawClass.OPEN_WITH_DER_TRIP,
 )
 
-#: breaks that something else hides or imitates: inside they are in neither count
-COINCIDENT = (DrawClass.OPEN_WITH_LOAD_STEP, DrawClass.OPEN_WITH_DER_TRIP)
+FALLEN = (DrawClass.FALLEN_SOURCE_SIDE, DrawClass.FALLEN_LOAD_SIDE)
+FALLEN_OHM = (0.0, 100.0, 500.0, float("inf"))
+"""Bands of fault resistance by which fallen conductors are counted besides."""
 
 
 def _reported() -> Iterator[ReportedClass]:
@@ -174,7 +184,7 @@ def _reported() -> Iterator[ReportedClass]:
         if drawn in NETWORK:
             yield row(name, "must_not_trip", "network", drawn, tuple(Side))
             continue
-        inside: Kind = "apart" if drawn in (*APART, *COINCIDENT) else "must_not_trip"
+        inside: Kind = "apart" if drawn in (*APART, *DISGUISED) else "must_not_trip"
         yield row(name, inside, "inside", drawn, INSIDE)
         for side, where in OUTSIDE:
             if drawn == DrawClass.WIRING and side != "other":
@@ -195,7 +205,10 @@ def reported_row(drawn: DrawClass) -> NDArray[np.int64]:
     return rows
 
 
-def sides(terminals: tuple[Terminal, ...], edge: NDArray[np.int64]) -> NDArray[np.int8]:
-    """(T, S): the Side of each event's edge for each terminal."""
-    table = np.stack([np.append(terminal.side, Side.NOWHERE) for terminal in terminals])
-    return np.asarray(table[:, edge], np.int8)
+def sides(terminals: tuple[Terminal, ...], event: Event) -> NDArray[np.int8]:
+    """(T, S): the Side of each event for each terminal: of its edge, or of its node."""
+    edges = np.stack([np.append(terminal.edge_side, Side.NOWHERE) for terminal in terminals])
+    nodes = np.stack([np.append(terminal.node_side, Side.NOWHERE) for terminal in terminals])
+    edge = np.where(event.edge >= 0, event.edge, event.at_edge)
+    found = np.where(edge >= 0, edges[:, edge], nodes[:, event.at_node])
+    return np.asarray(found, np.int8)

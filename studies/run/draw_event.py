@@ -59,7 +59,7 @@ def draw_wiring(
 
 def event_sides(case: Case, event: Event) -> NDArray[np.int8]:
     """(T, S): the Side of every event, seen from every terminal."""
-    return sides(case.points.terminals, event.edge)
+    return sides(case.points.terminals, event)
 
 
 def _open_phase(rng: np.random.Generator, case: Case, size: int) -> Event:

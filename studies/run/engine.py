@@ -11,9 +11,11 @@ from ...detector.criteria import Options
 from ...detector.evidence import Evidence, evidence_of, with_alarm
 from ...detector.instruments import Bounds, measure, miswire
 from ...detector.supervision import fed_one_way, wiring_alarm
-from ...model.machines import carried_over
+from ...model.after import solve_after
+from ...model.events.base import Event
 from ...model.network import Network
-from ...model.points import Side, into_line, point_probes
+from ...model.points import into_line, point_probes
+from ...model.sides import Side
 from ...model.solve import solve, steady_state
 from ...model.states import Answer, State
 from ..spec.study_file import Study
@@ -39,6 +41,7 @@ class Observed:
     edge: Int  #: (S,)
     share: NDArray[np.float64]  #: (S,)
     flags: Int  #: (S,)
+    fallen_ohm: NDArray[np.float64]  #: (S,) between a fallen conductor and earth; inf: none
 
 
 def options_of(study: Study) -> Options:
@@ -82,20 +85,13 @@ def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
         start=_guess(first.network, scenarios.before),
         tolerance_pu=TOLERANCE_PU,
     )
-    later = carried_over(
+    after = solve_after(
         second.network,
-        scenarios.before,
-        before,
+        (scenarios.before, before),
         scenarios.after,
-        event.der_factor,
-        scenarios.der_model,
-    )
-    after = solve(
-        second.network,
-        later,
+        (event.der_factor, scenarios.der_model),
         point_probes(second.points),
-        start=before.unit_v_pu * (later.emf_pu / scenarios.before.emf_pu),
-        tolerance_pu=TOLERANCE_PU,
+        TOLERANCE_PU,
     )
     phasors = measure(
         np.stack([before.v, after.v]),
@@ -118,6 +114,7 @@ def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
         edge=edge,
         share=event.share,
         flags=before.flags | after.flags,
+        fallen_ohm=_fallen_ohm(event),
     )
 
 
@@ -132,6 +129,14 @@ def _sides(case: Case, scenarios: Scenarios) -> NDArray[np.int8]:
     return np.where(kind > 0, np.where(mine, Side.PATH, Side.OTHER), side).astype(np.int8)
 
 
+def _fallen_ohm(event: Event) -> NDArray[np.float64]:
+    """(S,) resistance to earth of a break's fallen end."""
+    broken = event.open_after != 0
+    to_earth = np.abs(event.earth_after_s).max(axis=0) + np.abs(event.fallen_after_s).max(axis=0)
+    lies = broken & (to_earth > 0)
+    return np.where(lies, 1.0 / np.where(lies, to_earth, 1.0), np.inf)
+
+
 def _into(wired: Wired, answer: Answer) -> NDArray[np.complex128]:
     """(P, 3, S) currents, positive into each point's line."""
     return answer.i * into_line(wired.points)[:, None, None]
@@ -140,4 +145,5 @@ def _into(wired: Wired, answer: Answer) -> NDArray[np.complex128]:
 def _guess(network: Network, state: State) -> NDArray[np.float64]:
     """Winding voltages near the solution: the drop at nominal load, scaled by the mean load."""
     drop = 1.0 - solve(network, steady_state(network)).unit_v_pu
-    return np.asarray(1.0 - drop * state.load_scale.mean(axis=0))
+    mean = state.load_scale.sum(axis=0) / max(len(network.loads), 1)
+    return np.asarray(1.0 - drop * mean)

@@ -15,7 +15,7 @@ from ...optimise.counts import Corners, corners_of
 from ...optimise.staircase import Front, front_of
 from .along import distance_share
 from .cases import Case
-from .classes import REPORTED, DrawClass, reported_row
+from .classes import FALLEN, FALLEN_OHM, INSIDE, REPORTED, DrawClass, reported_row
 from .draw import BlockId, draw_scenarios
 from .engine import BLOCK, Observed, observe, options_of
 from .verdicts import pack_verdicts
@@ -46,9 +46,10 @@ class Tested:
     """What given settings do in a block. K settings a terminal; the first is the chosen one."""
 
     trials: Int  #: (R, T) per reported class
-    effective: Int  #: (R, T) with |ΔI1| > I_set/2 and |ΔV1| <= V_set
+    effective: Int  #: (R, T) with |ΔI| > I_set/2 and |ΔV| <= V_set, of any row that is judged
     trips: Int  #: (K, R, T)
     alarms: Int  #: (R, T) with the wiring alarm
+    fallen: Int  #: (2, bands, T, 2) inside by end and ohms as in ``FALLEN``: all, and trips
     reachable: Int  #: (T,) internal breaks with something connected beyond them
     found: Int  #: (K, T) of these
     missed: Int  #: (T, Reason) of these, by the criterion that failed
@@ -72,6 +73,7 @@ def train_block(case: Case, which: BlockId, size: int = BLOCK) -> Trained:
         i, v, z = reach.di_a[t], reach.dv_pu[t], reach.z_ohm[t]
         must = _of_kind("must_trip", rows[t]) & seen.connected
         must &= bool(case.judged[t]) and not terminal.load_side
+        must &= seen.flags & NOT_CONVERGED == 0
         must_not = _of_kind("must_not_trip", rows[t]) & case.judged[t]
         own = i[:, must], v[:, must], z[:, must]
         other = i[:, must_not], v[:, must_not], z[:, must_not]
@@ -100,8 +102,10 @@ def judge_block(
     seen = observe(case, draw_scenarios(case, which, size), *asked)
     evidence, rows = seen.evidence, _rows(which.drawn, seen)
     reason = _reasons(seen, settings, size)
-    trip = reason == Reason.TRIP
     reachable = _reachable(rows, seen)
+    # a break without a solution is no find
+    reason[:, reachable & (seen.flags & NOT_CONVERGED != 0)] = Reason.BLOCKED
+    trip = reason == Reason.TRIP
     terminals = range(len(settings))
     missed = reachable & ~trip[0]
     reach = [_reach(seen, t, settings[t][0]) for t in terminals]
@@ -110,6 +114,7 @@ def judge_block(
         effective=_counted(rows, _effective(seen, settings)),
         trips=np.stack([_counted(rows, own) for own in trip]),
         alarms=_counted(rows, _alarmed(seen)),
+        fallen=_fallen(which.drawn, seen, trip[0]),
         reachable=reachable.sum(axis=1),
         found=(trip & reachable).sum(axis=2),
         missed=np.stack(
@@ -153,8 +158,24 @@ def _effective(seen: Observed, settings: tuple[tuple[Settings | None, ...], ...]
     found = np.zeros(seen.side.shape, np.bool_)
     for t, (chosen, *_) in enumerate(settings):
         if chosen is not None:
-            near = seen.evidence.di1_a[t] > chosen.i_set_a / 2
-            found[t] = near & (seen.evidence.dv1_pu[t] <= chosen.v_set_pu)
+            rows = 4 if chosen.options.fallback else 1
+            near = seen.evidence.di_a[t, :rows] > chosen.i_set_a / 2
+            near &= seen.evidence.dv_pu[t, :rows] <= chosen.v_set_pu
+            found[t] = near.any(axis=0)
+    return found
+
+
+def _fallen(drawn: DrawClass, seen: Observed, trip: Flags) -> Int:
+    """Fallen conductors inside, by which end and what resistance: all, and those that trip."""
+    terminals = seen.side.shape[0]
+    found = np.zeros((len(FALLEN), len(FALLEN_OHM) - 1, terminals, 2), np.int64)
+    if drawn not in FALLEN:
+        return found
+    band = np.searchsorted(FALLEN_OHM, seen.fallen_ohm, side="right") - 1
+    inside = np.isin(seen.side, INSIDE)
+    for b in range(len(FALLEN_OHM) - 1):
+        own = inside & (band == b)
+        found[FALLEN.index(drawn), b] = np.stack([own.sum(axis=1), (own & trip).sum(axis=1)], 1)
     return found
 
 

@@ -24,6 +24,7 @@ class Validation:
     effective: NDArray[np.int64]  #: (R, T)
     trips: NDArray[np.int64]  #: (K, R, T)
     alarms: NDArray[np.int64]  #: (R, T)
+    fallen: NDArray[np.int64]  #: (2, bands, T, 2)
     reachable: NDArray[np.int64]  #: (T,)
     found: NDArray[np.int64]  #: (K, T)
     missed: NDArray[np.int64]  #: (T, Reason)
@@ -36,7 +37,7 @@ class Validation:
 
 #: what simply adds up over blocks
 ADDED = (
-    *("trials", "effective", "trips", "alarms", "reachable"),
+    *("trials", "effective", "trips", "alarms", "fallen", "reachable"),
     *("found", "missed", "profile", "flags"),
 )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from openphase.model.parts import Feeder, Section
-from openphase.model.points import Side
+from openphase.model.sides import Side
 
 __all__ = ["side_of", "without_source"]
 

@@ -36,7 +36,7 @@ from openphase.studies.spec.study_file import (
     default_study,
 )
 
-__all__ = ["UNKNOWN", "whole_feeder", "whole_study"]
+__all__ = ["UNKNOWN", "any_model", "whole_feeder", "whole_study"]
 
 UNKNOWN = ("T2", "T5")
 LATERALS = {"LK": ("R2", "K", 1.0), "LL": ("M", "L", 2.0), "LT": ("R4s", "T", 1.5)}
@@ -154,6 +154,13 @@ def _ders(wires: int) -> tuple[Der, ...]:
         )
         for n, model in enumerate(DER_MODELS)
     )
+
+
+def any_model(feeder: Feeder) -> Feeder:
+    """``feeder`` with DER that have what all models stand on."""
+    z = 1.0 + 12.0j
+    ders = tuple(replace(der, model="generator", z1_ohm=z, z2_ohm=z) for der in feeder.ders)
+    return replace(feeder, ders=ders)
 
 
 def whole_study(feeder: Feeder) -> Study:

@@ -11,16 +11,17 @@ import numpy as np
 import pytest
 from oracles.random_feeders import random_feeder
 from oracles.walks import side_of, without_source
-from oracles.whole import UNKNOWN, whole_feeder, whole_study
+from oracles.whole import UNKNOWN, any_model, whole_feeder, whole_study
 from scipy.stats import spearmanr
 
 from openphase.detector.criteria import Reason, Settings, verdict
 from openphase.detector.instruments import Wiring
+from openphase.model import load_feeder
 from openphase.model.distributions import Choices, Fixed
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
-from openphase.model.parts import Feeder
-from openphase.model.points import Side, find_points
+from openphase.model.points import find_points
+from openphase.model.sides import Side
 from openphase.model.solver.breaks import DEAD, FLOATING
 from openphase.model.states import NOT_CONVERGED
 from openphase.studies.run.cases import Wired
@@ -28,7 +29,7 @@ from openphase.studies.run.classes import REPORTED, DrawClass, Purpose, reported
 from openphase.studies.run.draw import BlockId, Case, Scenarios, draw_scenarios, make_cases
 from openphase.studies.run.engine import Observed, observe, options_of
 from openphase.studies.spec.parts import UNKNOWN_CONNECTION
-from openphase.studies.spec.study_file import DerDraw
+from openphase.studies.spec.study_file import DerDraw, default_study
 
 SIZE = 200
 MANY = 4000
@@ -37,6 +38,13 @@ NETWORK = (
     DrawClass.TIE_SWITCHING,
     DrawClass.TRANSFER,
     DrawClass.DER_RAMP,
+)
+#: what the paper's feeder lacks
+NEEDING_MORE = (
+    DrawClass.REGULATOR_TAP,
+    DrawClass.DER_TRIP,
+    DrawClass.DER_RAMP,
+    DrawClass.OPEN_WITH_DER_TRIP,
 )
 #: some of these stand at the source bus, where no line leads
 AT_DER = (DrawClass.DER_TRIP,)
@@ -95,11 +103,17 @@ def test_nothing_is_quietly_no_number(wires: int, group: int, drawn: DrawClass) 
     assert not lost[opens_all != 0b111].any()
 
 
-@pytest.mark.parametrize(
-    ("wires", "group", "drawn"),
-    # of wrong wiring the side is that of its point
-    [own for own in EVERYTHING if own[2] != DrawClass.WIRING],
-)
+@pytest.mark.parametrize("drawn", [own for own in DrawClass if own not in NEEDING_MORE])
+def test_a_feeder_without_loads_is_solved_too(drawn: DrawClass) -> None:
+    feeder = replace(load_feeder("paper"), loads=())
+    case = make_cases(feeder, default_study("paper"))[0]
+    found = observe(case, draw_scenarios(case, block(case, drawn), 20))
+    assert not (found.flags & NOT_CONVERGED).any()
+    assert np.isfinite(found.evidence.di_a).all()
+    assert np.isfinite(found.evidence.z_ohm).all()
+
+
+@pytest.mark.parametrize(("wires", "group", "drawn"), EVERYTHING)
 def test_sides_are_those_of_the_taken_apart_feeder(
     wires: int, group: int, drawn: DrawClass
 ) -> None:
@@ -227,13 +241,6 @@ def test_the_study_s_own_law_of_unknown_connections_is_taken() -> None:
     connection = many(case).before.connection[case.network.units.index("T2")]
     assert_share(int((connection == CONNECTIONS["D/D"]).sum()), 0.25)
     assert set(connection) == {CONNECTIONS["D/D"], CONNECTIONS["Y/D"]}
-
-
-def any_model(feeder: Feeder) -> Feeder:
-    """``feeder`` with DER of which all models have what they stand on."""
-    z = 1.0 + 12.0j
-    ders = tuple(replace(der, model="generator", z1_ohm=z, z2_ohm=z) for der in feeder.ders)
-    return replace(feeder, ders=ders)
 
 
 def test_der_models_are_drawn_by_their_weights() -> None:

@@ -30,7 +30,7 @@ from openphase.studies.run.engine import Observed, observe, options_of
 from openphase.studies.run.store import pack
 from openphase.studies.run.tally import Trained, judge_block, train_block
 from openphase.studies.run.verdicts import unpack_verdicts
-from openphase.studies.spec.study_file import Study, default_study
+from openphase.studies.spec.study_file import Group, Study, default_study
 
 SIZE = 250
 MARGIN = 1.25
@@ -239,28 +239,37 @@ def test_terminals_that_are_not_judged_contribute_nothing() -> None:
 
 def test_with_one_setting_for_all_a_terminal_is_judged_where_it_looks_away_too() -> None:
     """It keeps its setting there: false trips count, breaks that it cannot see do not."""
-    feeder = whole_feeder(4)
-    study = whole_study(feeder)
-    one = replace(
-        study,
-        network=replace(study.network, settings="one"),
-        detector=replace(study.detector, negative_sign=False),  # or it would save most of them
+    feeder, base = load_feeder("paper"), default_study("paper")
+    study = replace(
+        base,
+        network=replace(base.network, closed=None),
+        groups=(
+            Group(name="normal"),
+            Group(name="moved", closed=("R4",), opened=("R1",)),  # all is fed by R5
+        ),
+        detector=replace(base.detector, negative_sign=False),  # or it would save most of them
     )
+    one = replace(study, network=replace(study.network, settings="one"))
     apart, together = make_cases(feeder, study), make_cases(feeder, one)
     away = [np.array([t.load_side for t in case.points.terminals]) for case in apart]
     for n, case in enumerate(apart):
         np.testing.assert_array_equal(case.judged, ~away[n])
         np.testing.assert_array_equal(together[n].judged, ~(away[0] & away[1]))
-    turned = np.flatnonzero(away[1] & ~away[0])
-    assert [together[1].points.terminals[t].name for t in turned] == ["R1→R2"]
     case = together[1]
-    ties, breaks = (
+    turned = np.flatnonzero(away[1] & ~away[0])
+    assert [case.points.terminals[t].name for t in turned] == ["R1→R2", "R2→R3", "R3→R4"]
+    steps, breaks = (
         train_block(case, block(case, drawn), SIZE)
-        for drawn in (DrawClass.TIE_SWITCHING, DrawClass.OPEN_PHASE)
+        for drawn in (DrawClass.LOAD_STEP, DrawClass.OPEN_PHASE)
     )
-    assert count_tensor(case.grid, ties.false[turned[0]]).any()
-    assert breaks.trials[0, turned[0]] > 0
-    assert not breaks.opens[turned[0]].cell.size
+    everywhere = look(case, block(case, DrawClass.OPEN_PHASE), options_of(one))
+    lax = Settings(i_set_a=0.1, v_set_pu=0.05, z_set_ohm=0.1, options=options_of(one))
+    trips = verdict(everywhere.evidence, lax) == Reason.TRIP
+    for t in turned[1:]:
+        assert count_tensor(case.grid, steps.false[t]).any()
+        inside = everywhere.side[t] == Side.PATH
+        assert (trips[t] & inside & everywhere.connected).any()
+        assert not breaks.opens[t].cell.size
 
 
 @pytest.mark.parametrize(("kind", "drawn"), BOTH)
@@ -376,11 +385,19 @@ def test_judged_blocks_add_up(kind: str, drawn: DrawClass) -> None:
     bits = [int((known.flags & bit != 0).sum()) for bit in (DEAD, FLOATING, NOT_CONVERGED)]
     assert tested.flags.tolist() == bits
     assert not tested.trips[1].any()  # no setting never trips
+    np.testing.assert_array_equal(tested.sample_side, known.side[:, : tested.sample.shape[-1]])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pictures_show_the_first_events_by_the_setting_s_own_options(kind: str) -> None:
+    tested, known = judged_of(kind, DrawClass.OPEN_PHASE)
     kept = tested.sample.shape[-1]
-    evidence = known.evidence
-    parts = (evidence.di1_a, evidence.dv1_pu, evidence.z1_ohm.real, evidence.z1_ohm.imag)
-    np.testing.assert_array_equal(tested.sample, np.stack([x[:, :kept] for x in parts], axis=1))
-    np.testing.assert_array_equal(tested.sample_side, known.side[:, :kept])
+    for t, (one, *_) in enumerate(chosen_of(kind)):
+        reach = reach_of(known.evidence, one.options if one else Options(fallback=False))
+        reason = np.full(SIZE, Reason.BLOCKED) if one is None else verdict(known.evidence, one)[t]
+        size = np.abs(known.evidence.z1_ohm[t])
+        rows = (reach.di_a[t, 0], reach.dv_pu[t, 0], size, reach.z_ohm[t, 0], reason)
+        np.testing.assert_array_equal(tested.sample[t], np.stack(rows)[:, :kept])
 
 
 def test_alarms_are_for_wrong_wiring() -> None:
