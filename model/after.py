@@ -76,4 +76,4 @@ def _overvoltage(network: Network, answer: Answer) -> NDArray[np.bool_]:
 
 def _some(state: State, chosen: NDArray[np.int64]) -> State:
     """Some of the scenarios."""
-    return State(*(np.ascontiguousarray(values[..., chosen]) for values in state))
+    return State._make(np.ascontiguousarray(values[..., chosen]) for values in state)

@@ -107,6 +107,7 @@ def test_compiled_code_counts_no_references() -> None:
     def careless(size: int) -> Complex:
         return np.zeros(size, np.complex128)
 
-    assert numba.njit(careless)(3).size == 3
+    counting: Any = numba.njit
+    assert counting(careless)(3).size == 3
     with pytest.raises(numba.core.errors.TypingError, match="implementation of function"):
         compiled(careless)(3)

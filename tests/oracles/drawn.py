@@ -18,6 +18,7 @@ from openphase.model.parts import Feeder
 from openphase.model.states import State
 from openphase.studies.run.cases import Case, Wired
 from openphase.studies.run.draw import Scenarios
+from openphase.studies.spec.study_file import Group, SwitchState
 
 __all__ = ["Frames", "frames_of", "perfect", "reported"]
 
@@ -153,7 +154,11 @@ def _as_drawn(case: Case, scenarios: Scenarios, s: int) -> Feeder:
 def _state_of(case: Case, wired: Wired) -> tuple[SWITCHES, SWITCHES]:
     """Switches that are closed and points that are open, where that makes this network."""
     events = case.study.events
-    known = (*case.study.setting_groups(), *events.tie_switching.states, *events.transfer.states)
+    known: tuple[Group | SwitchState, ...] = (
+        *case.study.setting_groups(),
+        *events.tie_switching.states,
+        *events.transfer.states,
+    )
     for state in known:
         normal = [switch.name for switch in case.feeder.switches if switch.closed]
         closed = frozenset(normal if state.closed is None else state.closed)

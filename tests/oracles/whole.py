@@ -13,7 +13,7 @@ of the second, beyond the last, and of none. REG is a closed switch on three wir
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from oracles.event_sites import without_regulators
@@ -22,7 +22,17 @@ from openphase.model import load_feeder
 from openphase.model.distributions import Integers, Uniform
 from openphase.model.feeder import make_feeder
 from openphase.model.machines import DER_MODELS
-from openphase.model.parts import Capacitor, Der, Feeder, Line, Load, Place, Regulator, Switch
+from openphase.model.parts import (
+    Capacitor,
+    Connection,
+    Der,
+    Feeder,
+    Line,
+    Load,
+    Place,
+    Regulator,
+    Switch,
+)
 from openphase.studies.spec.study_file import (
     Correlation,
     Events,
@@ -100,9 +110,8 @@ DIRECT = (
 
 
 def _fields(feeder: Feeder) -> dict[str, Any]:
-    names = ("name", "source", "lines", "transformers", "loads", "ders", "capacitors")
-    names += ("regulators", "switches", "points", "sections")
-    return {name: getattr(feeder, name) for name in names}
+    bare = {"imported_from", "origins"}
+    return {f.name: getattr(feeder, f.name) for f in fields(feeder) if f.name not in bare}
 
 
 def _charged(line: Line) -> Line:
@@ -114,7 +123,8 @@ def _unit(paper: Feeder, name: str, wires: int) -> Any:
     unit = next(own for own in paper.transformers if own.name == name)
     if unit.place.line == "R2-R3":
         unit = replace(unit, place=Place(line="R2-M" if name == "T2" else "M2-R3", at=0.6))
-    connection = unit.connection if wires == 4 else {"T3": "D/D", "T4": "Y/D"}.get(name, "D/Yg")
+    on_three: dict[str, Connection] = {"T3": "D/D", "T4": "Y/D"}
+    connection = unit.connection if wires == 4 else on_three.get(name, "D/Yg")
     if name in UNKNOWN:
         return replace(unit, connection="unknown", x0_pu=None)
     x0_pu = unit.x0_pu if wires == 4 else None

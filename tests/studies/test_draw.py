@@ -61,7 +61,7 @@ def assert_share(chosen: Any, expected: float) -> None:
     assert abs(chosen.mean() - expected) < 5.0 * error
 
 
-def assert_uniform(values: NDArray[np.float64], low: float, high: float) -> None:
+def assert_uniform(values: NDArray[np.floating[Any]], low: float, high: float) -> None:
     assert values.min() >= low
     assert values.max() <= high
     assert kstest(values, "uniform", args=(low, high - low)).pvalue > 1e-3

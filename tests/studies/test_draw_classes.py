@@ -20,6 +20,7 @@ from openphase.model import load_feeder
 from openphase.model.distributions import Choices, Fixed
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
+from openphase.model.parts import Der, Load
 from openphase.model.points import find_points
 from openphase.model.sides import Side
 from openphase.model.solver.breaks import DEAD, FLOATING
@@ -167,7 +168,7 @@ def test_a_break_has_something_beyond_it_where_a_part_loses_its_supply(wires: in
     feeder = case.feeder
     scenarios, found = seen(wires, 0, DrawClass.OPEN_PHASE)
     units = {unit.name: unit.place for unit in feeder.transformers}
-    parts = [*feeder.loads, *feeder.ders]
+    parts: list[Load | Der] = [*feeder.loads, *feeder.ders]
     places = [units[p.transformer] if p.transformer else p.place for p in parts]
     lines = {line.name: line for line in feeder.lines}
     empty = 0

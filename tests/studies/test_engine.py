@@ -200,7 +200,7 @@ def test_fronts_are_those_of_comparing_each_with_each(drawn: DrawClass) -> None:
     reach = reach_of(seen.evidence, options_of(case.study))
     for t, front in enumerate(own.front):
         wanted = np.flatnonzero(_must_not(case, drawn, seen, t))
-        names = np.stack([[drawn, 0, n, case.group.index] for n in wanted] or [[0] * 4])
+        names = np.array([[int(drawn), 0, n, case.group.index] for n in wanted.tolist()], np.int64)
         events = tuple(x[t][:, wanted] for x in (reach.di_a, reach.dv_pu, reach.z_ohm))
         found = sorted(
             (tuple(name), row)
@@ -213,15 +213,14 @@ def test_fronts_are_those_of_comparing_each_with_each(drawn: DrawClass) -> None:
                 strict=True,
             )
         )
-        brute = sorted((name, list(row)) for row, name in brute_front(events, names[: wanted.size]))
+        brute = sorted((name, list(row)) for row, name in brute_front(events, names.reshape(-1, 4)))
         assert found == brute
 
 
 def _must_not(case: Case, drawn: DrawClass, seen: Observed, t: int) -> NDArray[np.bool_]:
-    inside = np.isin(seen.side[t], [Side.PATH, Side.LATERAL])
-    return (
-        np.asarray(~inside if drawn == DrawClass.OPEN_PHASE else inside | ~inside) & case.judged[t]
-    )
+    outside = ~np.isin(seen.side[t], [Side.PATH, Side.LATERAL])
+    chosen = outside if drawn == DrawClass.OPEN_PHASE else np.ones_like(outside)
+    return np.asarray(chosen & case.judged[t])
 
 
 def test_terminals_that_are_not_judged_contribute_nothing() -> None:

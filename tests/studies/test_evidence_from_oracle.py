@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -144,7 +145,8 @@ def test_every_frame_has_errors_of_its_own(name: str) -> None:
     for frame in (0, 1):
         error = np.zeros_like(scenarios.errors.v_noise)
         error[frame, :, 0] = 0.5  # one phase: equal errors of all three have no positive sequence
-        errors = replace(scenarios.errors, **{name: error})
+        changed: dict[str, Any] = {name: error}
+        errors = replace(scenarios.errors, **changed)
         seen = engine.observe(case, replace(scenarios, errors=errors)).evidence
         assert not np.isclose(seen.z1_ohm, exact.z1_ohm).all()
         pairs = [(seen.di1_a, exact.di1_a), (seen.dv1_pu, exact.dv1_pu)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from oracles.event_sites import LINES, Site
 
-from openphase.model.events.along import draw_node, fed_through, place_of
+from openphase.model.events.along import draw_node, fed_through
 from openphase.model.network import Network
 
 N = 6000
@@ -53,29 +53,3 @@ def test_supply_is_lost_where_the_graph_without_the_edge_has_no_way_to_the_sourc
         while grown := {x for pair in left if reached & set(pair) for x in pair} - reached:
             reached |= grown
         assert found[:, s].tolist() == [name not in reached for name in network.nodes]
-
-
-@pytest.mark.parametrize(
-    ("name", "line", "fraction"),
-    [
-        ("A", "SA", 1.0),
-        ("A2", "SA", 1.0),  # over the regulator
-        ("A2B:0.25", "A2B", 0.25),
-        ("C2", "BC", 1.0),
-        ("L", "BL", 1.0),
-        ("E", "SE", 1.0),
-    ],
-)
-def test_a_node_stands_at_the_end_of_the_line_that_leads_to_it(
-    site: Site, name: str, line: str, fraction: float
-) -> None:
-    network = site.network
-    edge, share = place_of(network, np.array([network.node(name)]))
-    found = network.line_fraction(int(edge[0]), float(share[0]))
-    assert found == (line, pytest.approx(fraction))
-
-
-def test_the_source_bus_stands_on_no_line(site: Site) -> None:
-    edge, share = place_of(site.network, np.array([0, site.network.node("A")]))
-    assert edge.tolist()[0] == -1
-    assert share.tolist() == [0.0, 1.0]

@@ -13,6 +13,7 @@ from scipy.stats import kstest
 
 from openphase.model.distributions import Fixed
 from openphase.model.events.der_trip import draw_der_trip
+from openphase.model.events.der_units import der_nodes
 from openphase.model.events.regulator_tap import draw_regulator_tap
 from openphase.model.events.source_step import draw_source_step
 
@@ -88,14 +89,14 @@ def test_at_an_end_stop_a_move_goes_the_other_way(
     assert {tuple(column) for column in np.rint(moves[:, here]).T.astype(int).tolist()} == wanted
 
 
-def test_a_tap_change_stands_where_the_line_ends_that_leads_to_the_regulator(
+def test_a_tap_change_is_at_its_regulator_and_on_no_line(
     site: Site, rng: np.random.Generator
 ) -> None:
     event = draw_regulator_tap(rng, 50, site.network, Fixed(value=1.0), 0.0)
+    assert (event.edge == -1).all()
     for s in range(50):
-        line = "SA" if event.tap_factor[0, 0, s] != 1.0 else "BC"
-        place = site.at(event, s)
-        assert (place.line, place.at) == (line, pytest.approx(1.0))
+        moved = int(np.flatnonzero((event.tap_factor[:, :, s] != 1.0).any(axis=1))[0])
+        assert site.network.tree.regulator[event.at_edge[s]] == moved
 
 
 @pytest.mark.parametrize(
@@ -113,19 +114,13 @@ def test_a_share_of_the_der_trips_and_one_at_least(
     assert (np.abs(tripped.mean(axis=1) - p) <= bound).all()
 
 
-def test_a_trip_stands_at_one_of_those_that_trip(site: Site) -> None:
+def test_a_trip_is_at_the_node_of_one_of_those_that_trip(site: Site) -> None:
     event = draw("der_trip", site, 400)
-    place_of_der = [("BC", 1.0), ("BL", 1.0), None, ("BC", 1.0)]
-    seen = set()
+    nodes = der_nodes(site.network)
+    assert (event.edge == -1).all()
     for s in range(400):
-        own = None
-        if event.edge[s] >= 0:
-            place = site.at(event, s)
-            own = (str(place.line), round(float(place.at or 0.0), 9))
-        tripped = np.flatnonzero(event.der_factor[:, s] == 0.0)
-        assert own in [place_of_der[d] for d in tripped]
-        seen.add(own)
-    assert seen == set(place_of_der)
+        assert event.at_node[s] in nodes[event.der_factor[:, s] == 0.0]
+    assert set(event.at_node.tolist()) == set(nodes.tolist())
 
 
 def test_all_der_ramp_alike(site: Site) -> None:
