@@ -164,9 +164,22 @@ def _apart_table(rows: Sequence[Row]) -> str:
         "<p><b>Told apart:</b> events in neither count. Trips of those inside the section, and "
         "how often wrong wiring raises the alarm.</p>\n"
     )
-    body = _matrix_rows(rows, inside, "trips", "0, 114, 178")
+    body: list[str] = []
+    for words, own in inside:
+        body += _matrix_rows(rows, [(words, own), *_by_ohm(words, own)], "trips", "0, 114, 178")
     body += _matrix_rows(rows, wiring, "alarms", "0, 114, 178")
     return text + table(_matrix_head(rows), body)
+
+
+def _by_ohm(words: str, own: Cells) -> list[tuple[str, Cells]]:
+    """Fallen conductors by their resistance to earth; none of any other class."""
+    found: dict[str, Cells] = {}
+    for t, one in own.items():
+        for band in one.get("by_ohm", ()):
+            high = "more" if band["ohm_to"] is None else f"{band['ohm_to']:g}"
+            text = f"{words}, {band['ohm_from']:g} to {high} Ω"
+            found.setdefault(text, {})[t] = band
+    return list(found.items())
 
 
 def _missed_table(rows: Sequence[Row]) -> str:

@@ -51,7 +51,10 @@ def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
     ax.set_title(f"{layout.name}: {len(feeder.lines)} lines, {len(feeder.points)} measuring points")
     handles = _legend(layout)
     ax.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.4 / (1 + layout.rows)), ncols=4
+        handles=handles,
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.42 / (row_height * layout.rows)),
+        ncols=4,
     )
     return ax
 

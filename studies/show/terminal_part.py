@@ -101,9 +101,9 @@ def _classes(row: Row) -> str:
             f"All {len(classes)} classes and sides, the worst first",
             table(HEAD, [_class_row(own) for own in classes]),
         )
-        + '<p class="faint">Effective trials come near the thresholds: |ΔI1| > I_set/2 and '
-        "|ΔV1| ≤ V_set. Where they are few, no trips show little; what comes near by its phases "
-        "alone is not among them.</p>"
+        + '<p class="faint">Effective trials come near the thresholds, by the positive sequence or '
+        "by a phase that may stand in: |ΔI| > I_set/2 and |ΔV| ≤ V_set. Where they are few, no "
+        "trips show little.</p>"
     )
 
 

@@ -52,7 +52,7 @@ class Family(StrEnum):
     """Classes that share a colour, in a reader's words."""
 
     INSIDE = "break inside: must trip"
-    OUTSIDE = "break elsewhere"
+    OUTSIDE = "open phase elsewhere"
     LOAD = "load, capacitor or motor step"
     SOURCE = "source step, regulator tap"
     FAULT = "fault"
@@ -63,6 +63,9 @@ class Family(StrEnum):
 
 FAMILY = {
     DrawClass.OPEN_PHASE: Family.OUTSIDE,
+    DrawClass.SINGLE_POLE: Family.OUTSIDE,
+    DrawClass.FALLEN_SOURCE_SIDE: Family.OUTSIDE,
+    DrawClass.FALLEN_LOAD_SIDE: Family.OUTSIDE,
     DrawClass.LOAD_STEP: Family.LOAD,
     DrawClass.CAPACITOR_STEP: Family.LOAD,
     DrawClass.MOTOR_START: Family.LOAD,

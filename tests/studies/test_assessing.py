@@ -352,7 +352,7 @@ def test_the_report_of_an_assessment(home: Path, tmp_path: Path) -> None:
     for row in said.result["sections"]:
         assert f"{row['false_trips']:,} of {row['security_trials']:,}" in page
     pictures = {path.name for path in (tmp_path / "assessed").glob("*.png")}
-    assert {"feeder.png", "overview.png", "01-R1-R2-evidence.png"} <= pictures
+    assert {"feeder.png", "01-R1-R2-evidence.png"} <= pictures
 
 
 def test_a_sheet_without_groups_is_that_of_the_only_group(copy: Path) -> None:

@@ -133,3 +133,15 @@ def test_a_figure_is_saved_as_its_name_says(tmp_path):
     assert (tmp_path / "a.PNG").read_bytes().startswith(b"\x89PNG")
     with pytest.raises(ValueError, match=r"must end in .png or .svg, got '.pdf'"):
         figures.save_figure(figure, tmp_path / "a.pdf")
+
+
+def test_a_crowded_schematic_keeps_its_legend_clear_of_the_axis():
+    text = FORKED
+    for n in range(30):
+        text += f'[[loads]]\nname = "unit{n}"\nline = "C-D"\nat = {0.03 * (n + 1):.2f}\nkw = 1.0\n'
+    ax = feeder_plot.plot_feeder(feeder_from_toml(text, "crowded.toml"))
+    figure = ax.get_figure()
+    with figures.house_style():
+        figure.draw_without_rendering()
+        legend, label = (own.get_window_extent() for own in (ax.get_legend(), ax.xaxis.label))
+    assert not legend.overlaps(label)
