@@ -28,8 +28,8 @@ help:
 
 # 3 is an answer too: "sized, but some section stays without proven settings".
 demo: $(VENV)/installed
-	@echo '$(BIN)/openphase size paper'
-	@$(BIN)/openphase size paper || test $$? -eq 3
+	@echo '$(BIN)/openphase size paper --yes'
+	@$(BIN)/openphase size paper --yes || test $$? -eq 3
 
 test: $(VENV)/needs-test $(VENV)/installed
 	MPLBACKEND=agg $(BIN)/pytest tests

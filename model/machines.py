@@ -2,7 +2,8 @@
 
 A machine takes or delivers power in the positive sequence and is an admittance of its own
 to the negative. Before an event DER deliver what is asked of them; after it each keeps
-something: the EMF behind its impedance, its current, or its power.
+something: the EMF behind its impedance, its current, or its power. A current that has no way
+back beyond open phases has no solution: such conductors are flagged, and answered with 0 V.
 """
 
 from __future__ import annotations

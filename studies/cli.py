@@ -66,6 +66,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except OSError as error:
+        if error.filename is not None:
+            print(f"{error.filename}: {error.strerror or error}", file=sys.stderr)
+            return FAILED
         # The reader (head, less) has left, or the answer has no room where it should go:
         # keep the interpreter from complaining again as it ends.
         if not isinstance(error, BrokenPipeError):
