@@ -1,8 +1,9 @@
 """``openphase assess``: what existing settings are worth, on the draws that ``size`` uses.
 
-Nothing is chosen and nothing is trained, so no attempt is spent. The validation sample is that
-of the same feeder, study, seed and size, so that `compare` can pair the two runs scenario by
-scenario.
+Nothing is chosen and nothing is trained, so no attempt of its own is spent: it is that of the
+same feeder, study, seed and size, so that `compare` can pair the two runs scenario by scenario.
+It is taken down all the same. Who changes the study after looking gets fresh draws; and of
+several sheets that were judged on the same draws only the first can be certified by them.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ from pathlib import Path
 from typing import Any
 
 from ..detector.criteria import Settings
-from ..model.errors import Fault, InputError
+from ..model.errors import Fault, InputError, OpenPhaseError
 from ..model.parts import Feeder
 from .run.cases import Case, make_cases
 from .run.certify import Given, Rival, Validation, certified, sheets_of
 from .run.choose import reference_settings
 from .run.classes import Purpose
-from .run.digests import digest, manifest, population_digest
+from .run.digests import digest, feeder_digest, manifest, population_digest
 from .run.engine import options_of
-from .run.ledger import Attempt, find_attempt
+from .run.ledger import Attempt, find_attempt, reserve, sheets_before
 from .run.options import options_text
 from .run.session import (
     Demand,
@@ -57,6 +58,13 @@ CHOSEN_ON_THESE = (
     "run's results guided the change, the settings were chosen on this sample and its bounds do "
     "not hold; another --seed draws a fresh one"
 )
+
+AFTER_OTHERS = (
+    "these very draws have judged {others} other sheet(s) before: where their results guided this "
+    "one, it was chosen on this sample and its bounds do not hold; another --seed draws a fresh one"
+)
+
+LEDGER = "ledger.json"
 
 LEFT_OUT = "the sheet leaves this terminal without a setting"
 
@@ -133,11 +141,11 @@ def assess_feeder(
         for case, group in zip(cases, given, strict=True)
     ]
     sheets = sheets_of(cases, validations, attempt.number, chosen=False)
-    answer = (
-        answer_head(cases, attempt)
-        | {"assessed": _assessed(sheet, given, attempt)}
-        | certified(sheets, rows, rivals)
-    )
+    drawn = (population_digest(feeder, study), attempt.seed, attempt.number)
+    assessed = _assessed(sheet, given, attempt, drawn, out.resolve().parent / LEDGER)
+    answer = answer_head(cases, attempt) | {"assessed": assessed} | certified(sheets, rows, rivals)
+    if assessed["sheets_before"] or assessed["note"] == CHOSEN_ON_THESE:
+        _demote(answer["sections"], assessed["note"])
     folder.write("result.json", as_json(answer))
     folder.write("settings.csv", settings_csv(answer))
     write_report(answer, cases, None, validations, folder)
@@ -166,20 +174,23 @@ def _begin(
     demand: Demand,
     out: Path,
 ) -> tuple[RunFolder, Attempt]:
-    """Announce the run and make the folder its own; the ledger is read, not written."""
+    """Announce the run, take its attempt down, and make the folder its own."""
     feeder, study = cases[0].feeder, cases[0].study
-    attempt = find_attempt(
-        out.resolve().parent / "ledger.json",
-        population_digest(feeder, study),
+    book = out.resolve().parent / LEDGER
+    entry = (
+        feeder_digest(feeder),
         digest(dump_study(study)),
         demand.seed,
         demand.scenarios or functools.partial(default_scenarios, cases),
     )
+    attempt = find_attempt(book, *entry)
     folder = RunFolder(out)
     command = ("assess", feeder.name, "--settings", "settings.csv", "--study", "study.toml")
     made_from = manifest(command, feeder, study, attempt)
     made_from["settings_sha256"] = _digest_of(given)
     announce(cases, folder, made_from, attempt, demand, (Purpose.VALIDATE,))
+    if reserve(book, *entry) != attempt:
+        raise OpenPhaseError(f"{book}: another run took the attempt meanwhile; start again")
     folder.begin(made_from)
     folder.write("study.toml", dump_study(study))
     folder.log(
@@ -213,31 +224,53 @@ def _assessed(
     sheet: SettingsSheet | None,
     given: tuple[tuple[Settings | None, ...], ...],
     attempt: Attempt,
+    drawn: tuple[str, int, int],
+    book: Path,
 ) -> dict[str, Any]:
-    """What was assessed, and whether these very draws had a part in choosing it."""
-    origin = None if sheet is None else _origin(Path(sheet.source).parent, sheet, attempt)
+    """What was assessed, and whether these very draws had a part in choosing it.
+
+    ``drawn`` is what tells the draws from others: population, seed and attempt.
+    """
+    sha = _digest_of(given)
+    origin = None if sheet is None else _origin(Path(sheet.source).parent, sheet, drawn)
+    sized = origin is not None and origin["same_draws"] and not origin["edited"]
+    others = 0
+    if sheet is not None and not (sized and origin and origin["verb"] == "size"):
+        others = sheets_before(book, attempt, sha)
     note = None
     if origin is not None and origin["same_draws"]:
-        note = CHOSEN_ON_THESE if origin["edited"] else SAME_EVIDENCE
+        note = SAME_EVIDENCE if sized else CHOSEN_ON_THESE
+    if others:
+        note = AFTER_OTHERS.format(others=others)
     return {
         "settings": REFERENCE if sheet is None else Path(sheet.source).name,
-        "settings_sha256": _digest_of(given),
+        "settings_sha256": sha,
+        "sheets_before": others,
         "run_beside": origin,
         "note": note,
     }
 
 
-def _origin(folder: Path, sheet: SettingsSheet, attempt: Attempt) -> dict[str, Any] | None:
+def _demote(rows: list[dict[str, Any]], note: str) -> None:
+    """Settings that may have been chosen on these draws are certified by nothing."""
+    for row in rows:
+        if row["status"] in ("set", "weak"):
+            row["status"], row["reason"] = "not_certified", note
+
+
+def _origin(
+    folder: Path, sheet: SettingsSheet, drawn: tuple[str, int, int]
+) -> dict[str, Any] | None:
     """The run in whose folder the sheet lies; None where there is none."""
     try:
         made_from = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-        drawn = tuple(made_from[key] for key in ("population_sha256", "seed", "attempt"))
+        there = tuple(made_from[key] for key in ("population_sha256", "seed", "attempt"))
         return {
             "verb": str(made_from["command"][0]),
             "seed": made_from["seed"],
             "attempt": made_from["attempt"],
-            "same_draws": drawn == (attempt.population, attempt.seed, attempt.number),
+            "same_draws": there == drawn,
             "edited": _sheet_values(sheet, result) != _result_values(result),
         }
     except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError):

@@ -93,7 +93,10 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "units": [unit.name for unit in units],
         "yg_d": [unit.name for unit in units if unit.connection == "Yg/D"],
         "yg_d_sampled": [unit.name for unit in units if unit.name in study.transformers.yg_d],
-        "yg_d_unknown": [unit.name for unit in units if unit.connection == "unknown"],
+        # on three wires an unknown unit has no neutral to be Yg by
+        "yg_d_unknown": [
+            unit.name for unit in units if unit.connection == "unknown" and feeder.source.wires == 4
+        ],
         "loads": hanging(feeder.loads),
         "ders": hanging(feeder.ders),
         "capacitors": [bank.name for bank in feeder.capacitors if inside.holds(bank.place)],

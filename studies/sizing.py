@@ -16,7 +16,7 @@ from .run.cases import Case, make_cases
 from .run.certify import Given, Rival, Validation, certified, sheets_of
 from .run.choose import Chosen, Training, as_settings, choices, gather, reference_settings
 from .run.classes import Purpose
-from .run.digests import digest, manifest, population_digest
+from .run.digests import digest, feeder_digest, manifest
 from .run.draw import BlockId
 from .run.ledger import Attempt, find_attempt, reserve
 from .run.session import (
@@ -108,7 +108,7 @@ def _begin(cases: Sequence[Case], demand: Demand, out: Path) -> tuple[RunFolder,
     feeder, study = cases[0].feeder, cases[0].study
     book = out.resolve().parent / "ledger.json"
     entry = (
-        population_digest(feeder, study),
+        feeder_digest(feeder),
         digest(dump_study(study)),
         demand.seed,
         demand.scenarios or functools.partial(default_scenarios, cases),

@@ -21,6 +21,8 @@ def read_text(path: Path) -> str:
     InputError
         If the file cannot be read or is not UTF-8.
     """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError.single(str(path), "", "no regular file", "must be a file to read")
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:

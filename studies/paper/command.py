@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import __version__
+from ...model.errors import OpenPhaseError
 from ...model.parts import Feeder
 from ...model.reading.feeder_file import load_feeder
 from ..run.store import as_json, write_whole
@@ -41,6 +42,7 @@ def paper_command(args: argparse.Namespace) -> int:
     feeder = load_feeder("paper")
     groups = paper_groups(feeder)
     if args.out:
+        _check_folder(args.out)
         _write(args.out, feeder, groups)
     print(as_json(paper_result(groups)) if args.json else paper_table(groups), end="")
     return 0
@@ -49,6 +51,12 @@ def paper_command(args: argparse.Namespace) -> int:
 def paper_groups(feeder: Feeder) -> tuple[Group, ...]:
     """Everything that is compared, figure by figure."""
     return (*open_loop_groups(feeder), *two_source_groups(feeder))
+
+
+def _check_folder(folder: Path) -> None:
+    """A folder that holds something else is left alone."""
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / "paper.txt").is_file():
+        raise OpenPhaseError(f"{folder}: holds other files; choose another --out")
 
 
 def _write(folder: Path, feeder: Feeder, groups: tuple[Group, ...]) -> None:

@@ -15,6 +15,7 @@ from ...detector.criteria import Reason, Settings
 from ...optimise.certificate import share_of_alpha, two_sided, upper_bound
 from .cases import Case
 from .classes import FALLEN, FALLEN_OHM, REPORTED, DrawClass
+from .draw_event import possible_rows
 from .engine import options_of
 from .options import options_text, trigger_text
 from .status import load_side_status, status_of
@@ -133,8 +134,12 @@ def section_row(sheet: Sheet, t: int, given: Given) -> dict[str, Any]:
         status, reason = load_side_status(None)
         return row | _no_evidence() | {"status": status, "reason": reason}
     validation, alpha = sheet.validation, sheet.alpha
-    classes = [_class_row(r, t, own, validation, alpha) for r in range(len(REPORTED))]
-    classes = [one for one in classes if one["trials"]]
+    possible = possible_rows(case)[:, t] & bounded_rows()
+    classes = [
+        _class_row(r, t, own, validation, alpha)
+        for r in range(len(REPORTED))
+        if validation.trials[r, t] or possible[r]
+    ]
     must_not = [one for one in classes if one["kind"] == "must_not_trip"]
     row |= _dependability(t, 0, own, validation, alpha)
     row |= {
@@ -217,6 +222,11 @@ def _no_evidence() -> dict[str, Any]:
         )
     )
     return empty | {"classes": [], "causes": [], "nearest_false_trip": None, "fixes": []}
+
+
+def bounded_rows() -> NDArray[np.bool_]:
+    """(R,): rows of ``REPORTED`` of which a bound is demanded."""
+    return np.array([own.kind == "must_not_trip" for own in REPORTED])
 
 
 def _class_row(

@@ -17,8 +17,8 @@ from ...optimise.thresholds import Choice, Refusal, Sample, choose, pool
 from ..spec.study_file import Study
 from .cases import Case
 from .classes import REPORTED, DrawClass, Purpose
-from .draw import BlockId
-from .draw_event import draw_event, event_sides
+from .draw import BlockId, whole_rounds
+from .draw_event import draw_event, event_sides, possible_rows
 from .engine import BLOCK, options_of
 from .ledger import Attempt
 from .status import common_window
@@ -38,6 +38,7 @@ __all__ = [
 
 MERGE_EVERY = 32  #: blocks gathered between merges; bounds memory, changes no result
 
+MOST_TIMES = 4  #: the planned blocks of a class, where a side of it proves rare
 PILOT = 4000  #: events drawn, and not solved, to see how often each class and side comes up
 
 #: every class that the certificate bounds, and the breaks, need as many trials as asked for
@@ -55,27 +56,34 @@ def planned_blocks(case: Case, purpose: Purpose, attempt: Attempt) -> list[Block
             continue  # told apart wherever it stands: no setting depends on it
         share = _smallest_share(case, drawn)
         draws = n / share + 4.0 * math.sqrt(n * (1.0 - share)) / share
-        blocks += _blocks(case, purpose, attempt, drawn, range(math.ceil(draws / BLOCK)))
+        count = whole_rounds(case, drawn, math.ceil(draws / BLOCK))
+        blocks += _blocks(case, purpose, attempt, drawn, range(count))
     return blocks
 
 
 def more_blocks(
     case: Case, had: list[BlockId], trials: NDArray[np.int64], attempt: Attempt
 ) -> list[BlockId]:
-    """Further blocks for classes that are still short of trials at a judged terminal."""
+    """Further blocks for classes that are still short of trials at a judged terminal.
+
+    Never more than ``MOST_TIMES`` the plan: what is rarer than that stays short, and shows it
+    in its bound.
+    """
     n, blocks = attempt.scenarios, []
+    possible = possible_rows(case)
     for drawn in case.drawn:
         own = [which for which in had if which.drawn == drawn]
-        rows = [r for r in BOUNDED if REPORTED[r].drawn == drawn and trials[r].any()]
-        if not own or not rows or not case.judged.any():
+        rows = [r for r in BOUNDED if REPORTED[r].drawn == drawn]
+        wanted = possible[rows] & case.judged
+        if not own or not wanted.any():
             continue
-        counts = trials[rows][:, case.judged]
-        # a class that cannot occur at a terminal has no trials there, however many are drawn
-        least = int(counts[counts > 0].min(initial=n))
-        if least < n:
-            extra = math.ceil(1.2 * (n - least) * len(own) / least)
-            new = range(len(own), len(own) + extra)
-            blocks += _blocks(case, own[0].purpose, attempt, drawn, new)
+        least = int(trials[rows][wanted].min(initial=n))
+        planned = planned_blocks(case, own[0].purpose, attempt)
+        most = MOST_TIMES * sum(which.drawn == drawn for which in planned)
+        if least < n and len(own) < most:
+            extra = math.ceil(1.2 * (n - least) * len(own) / max(least, 1))
+            stop = whole_rounds(case, drawn, min(len(own) + extra, most))
+            blocks += _blocks(case, own[0].purpose, attempt, drawn, range(len(own), stop))
     return blocks
 
 

@@ -18,6 +18,7 @@ __all__ = [
     "FALLEN",
     "FALLEN_OHM",
     "INSIDE",
+    "NETWORK",
     "REPORTED",
     "DrawClass",
     "Kind",

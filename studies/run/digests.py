@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from dataclasses import replace
+from dataclasses import fields, replace
 from importlib import metadata, resources
+from typing import Any
 
 from ... import __version__
-from ...model.parts import Feeder
+from ...model.parts import Feeder, Section
 from ...model.reading.feeder_file import feeder_content
 from ..spec.study_file import Study, dump_population, dump_study, resolved
 from .engine import BLOCK
 from .ledger import Attempt
 
-__all__ = ["code_digest", "digest", "manifest", "population_digest"]
+__all__ = ["code_digest", "digest", "feeder_digest", "manifest", "population_digest"]
 
 LIBRARIES = ("numpy", "scipy", "numba")
 
@@ -22,6 +23,22 @@ LIBRARIES = ("numpy", "scipy", "numba")
 def digest(*texts: str) -> str:
     """SHA-256 of texts."""
     return hashlib.sha256("\0".join(texts).encode("utf-8")).hexdigest()
+
+
+def feeder_digest(feeder: Feeder) -> str:
+    """SHA-256 of a feeder, whatever it is called and in whatever order its parts are listed."""
+    tables: dict[str, Any] = {
+        field.name: tuple(sorted(getattr(feeder, field.name), key=_listed_by))
+        for field in fields(feeder)
+        if isinstance(getattr(feeder, field.name), tuple)
+    }
+    return digest(feeder_content(replace(feeder, name="any", **tables)))
+
+
+def _listed_by(part: object) -> tuple[str, str]:
+    if isinstance(part, Section):
+        return part.local, part.remote
+    return str(getattr(part, "name", "")), ""
 
 
 def population_digest(feeder: Feeder, study: Study) -> str:
@@ -51,7 +68,7 @@ def manifest(
         "libraries": {name: metadata.version(name) for name in LIBRARIES},
         "feeder_sha256": digest(feeder_content(feeder)),
         "study_sha256": digest(dump_study(study)),
-        "population_sha256": attempt.population,
+        "population_sha256": population_digest(feeder, study),
         "seed": attempt.seed,
         "scenarios": attempt.scenarios,
         "attempt": attempt.number,

@@ -30,6 +30,7 @@ __all__ = [
     "make_case",
     "make_cases",
     "stream",
+    "whole_rounds",
 ]
 
 Int = NDArray[np.int64]
@@ -93,10 +94,20 @@ def draw_scenarios(case: Case, which: BlockId, size: int) -> Scenarios:
     )
 
 
+def whole_rounds(case: Case, drawn: DrawClass, blocks: int) -> int:
+    """Blocks of a class, in whole rounds where each goes to one other state or comes from it."""
+    each = max(2 * len(_other_states(case, drawn)), 1)
+    return -(-blocks // each) * each
+
+
+def _other_states(case: Case, drawn: DrawClass) -> tuple[Wired, ...]:
+    states = {DrawClass.TIE_SWITCHING: case.ties, DrawClass.TRANSFER: case.transfers}
+    return states.get(drawn, ())
+
+
 def _switched(case: Case, which: BlockId) -> tuple[Wired, Wired]:
     """The network before and after: blocks of switching go to each other state and back."""
-    states = {DrawClass.TIE_SWITCHING: case.ties, DrawClass.TRANSFER: case.transfers}
-    others = states.get(which.drawn, ())
+    others = _other_states(case, which.drawn)
     if not others:
         return case.wired, case.wired
     other = others[which.block // 2 % len(others)]

@@ -11,6 +11,7 @@ from ...model.events.base import Event, no_event
 from ...model.events.capacitor_step import draw_capacitor_step
 from ...model.events.der_ramp import draw_der_ramp
 from ...model.events.der_trip import draw_der_trip
+from ...model.events.der_units import der_nodes
 from ...model.events.earth_fault import draw_earth_fault
 from ...model.events.energisation import draw_energisation
 from ...model.events.fallen import draw_fallen_load_side, draw_fallen_source_side
@@ -28,9 +29,9 @@ from ...model.events.source_step import draw_source_step
 from ...model.events.step_with_tap import draw_step_with_tap
 from ..spec.events import WIRING_KINDS
 from .cases import Case
-from .classes import DrawClass, sides
+from .classes import NETWORK, REPORTED, DrawClass, sides
 
-__all__ = ["draw_event", "draw_wiring", "event_sides"]
+__all__ = ["draw_event", "draw_wiring", "event_sides", "possible_rows"]
 
 Int = NDArray[np.int64]
 _Draw = Callable[[np.random.Generator, Case, int], Event]
@@ -60,6 +61,27 @@ def draw_wiring(
 def event_sides(case: Case, event: Event) -> NDArray[np.int8]:
     """(T, S): the Side of every event, seen from every terminal."""
     return sides(case.points.terminals, event)
+
+
+def possible_rows(case: Case) -> NDArray[np.bool_]:
+    """(R, T): the rows of ``REPORTED`` in which the study's events can count at a terminal.
+
+    Equipment stands where it stands; every other class is drawn on all lines.
+    """
+    network, terminals = case.network, case.points.terminals
+    lines = np.flatnonzero(network.length_km > 0)
+    at_edges = {DrawClass.REGULATOR_TAP: np.flatnonzero(network.tree.regulator >= 0)}
+    found = np.zeros((len(REPORTED), len(terminals)), np.bool_)
+    for r, own in enumerate(REPORTED):
+        if own.drawn not in case.drawn:
+            continue
+        for t, terminal in enumerate(terminals):
+            seen = terminal.edge_side[at_edges.get(own.drawn, lines)]
+            if own.drawn == DrawClass.DER_TRIP:
+                seen = terminal.node_side[der_nodes(network)]
+            whole = own.drawn in (*NETWORK, DrawClass.WIRING)
+            found[r, t] = whole or bool(np.isin(seen, own.where).any())
+    return found
 
 
 def _open_phase(rng: np.random.Generator, case: Case, size: int) -> Event:

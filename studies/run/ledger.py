@@ -1,9 +1,10 @@
 """How often a certificate has been tried for: trying again costs error probability.
 
-``ledger.json`` stands beside the run folders. Attempts are counted per *population*: the
-feeder, and what the study says of loads, events and instruments. What is demanded of the
-settings (device, margin, target) is not part of it, or one could go on choosing on one
-validation sample until it shows no false trip. Repeating a run keeps its number.
+``ledger.json`` stands beside the run folders. Attempts are counted per *feeder*, whatever is
+studied on it: with another margin, another law of some event or another seed one could go on
+until a validation sample shows no false trip. Each gets draws of its own. Repeating a run
+keeps its number. Sheets that were judged on an attempt's draws are noted with it, for a sheet
+that was changed after looking at them is certified by nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 from ...model.errors import OpenPhaseError
 from .store import as_json, write_whole
 
-__all__ = ["Attempt", "find_attempt", "reserve"]
+__all__ = ["Attempt", "find_attempt", "reserve", "sheets_before"]
 
 LOCK_TRIES, LOCK_WAIT_S = 100, 0.1
 
@@ -29,42 +30,57 @@ class Attempt:
 
     number: int
     scenarios: int
-    population: str  #: hash of what is drawn
+    feeder: str  #: hash of the feeder
     study: str  #: hash of the whole study
     seed: int
 
 
 def find_attempt(
-    path: Path, population: str, study: str, seed: int, size: int | Callable[[int], int]
+    path: Path, feeder: str, study: str, seed: int, size: int | Callable[[int], int]
 ) -> Attempt:
     """Look an attempt up in the ledger at ``path``, or take the next number; nothing is written.
 
     ``size`` is the number of scenarios, or gives it for an attempt's number where the user
     named none: later attempts need more.
     """
-    entries = _read(path).get(population, [])
+    entries = _read(path).get(feeder, [])
     for number in range(1, len(entries) + 2):
         scenarios = size if isinstance(size, int) else size(number)
         entry = {"study": study, "seed": seed, "scenarios": scenarios}
-        if number > len(entries) or entries[number - 1] == entry:
+        if number > len(entries) or entry.items() <= entries[number - 1].items():
             break
-    return Attempt(
-        number=number, scenarios=scenarios, population=population, study=study, seed=seed
-    )
+    return Attempt(number=number, scenarios=scenarios, feeder=feeder, study=study, seed=seed)
 
 
 def reserve(
-    path: Path, population: str, study: str, seed: int, size: int | Callable[[int], int]
+    path: Path, feeder: str, study: str, seed: int, size: int | Callable[[int], int]
 ) -> Attempt:
     """Find the attempt and write it into the ledger, so that no other run gets its number."""
     with _locked(path):
-        attempt = find_attempt(path, population, study, seed, size)
+        attempt = find_attempt(path, feeder, study, seed, size)
         ledger = _read(path)
-        entries = ledger.setdefault(population, [])
+        entries = ledger.setdefault(feeder, [])
         if attempt.number > len(entries):
             entries.append({"study": study, "seed": seed, "scenarios": attempt.scenarios})
             write_whole(path, as_json(ledger).encode("utf-8"))
     return attempt
+
+
+def sheets_before(path: Path, attempt: Attempt, sheet: str) -> int:
+    """Note that a sheet (its hash) is judged on an attempt's draws; how many others were before.
+
+    A sheet that is judged again keeps its place.
+    """
+    with _locked(path):
+        ledger = _read(path)
+        entry = ledger[attempt.feeder][attempt.number - 1]
+        seen = entry.setdefault("sheets", [])
+        if not isinstance(seen, list):
+            raise OpenPhaseError(f"{path}: is no ledger of openphase: must list sheets")
+        if sheet not in seen:
+            seen.append(sheet)
+            write_whole(path, as_json(ledger).encode("utf-8"))
+        return seen.index(sheet)
 
 
 @contextmanager
@@ -91,7 +107,7 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _read(path: Path) -> dict[str, list[dict[str, object]]]:
-    """The ledger: attempts in order, by population. Raises OpenPhaseError where it is none."""
+    """The ledger: attempts in order, by feeder. Raises OpenPhaseError where it is none."""
     try:
         ledger = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -7,7 +7,7 @@ import functools
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -243,12 +243,9 @@ def exit_code(result: dict[str, Any]) -> int:
     if any(row["status"] == "not_certified" for row in rows):
         return 3
 
-    def sections(statuses: set[str]) -> set[tuple[str, frozenset[str]]]:
-        return {
-            (row["setting_group"], frozenset((row["local"], row["remote"])))
-            for row in rows
-            if row["status"] in statuses
-        }
+    def sections(own: Iterable[dict[str, Any]]) -> set[tuple[str, frozenset[str]]]:
+        return {(row["setting_group"], frozenset((row["local"], row["remote"]))) for row in own}
 
-    every = {row["status"] for row in rows}
-    return 0 if sections({"set", "weak"}) == sections(every) else 3
+    # a setting that finds nothing serves nobody
+    usable = [row for row in rows if row["status"] in ("set", "weak") and row["detected"]]
+    return 0 if sections(usable) == sections(rows) else 3

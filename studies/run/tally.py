@@ -161,7 +161,8 @@ def _effective(seen: Observed, settings: tuple[tuple[Settings | None, ...], ...]
             rows = 4 if chosen.options.fallback else 1
             near = seen.evidence.di_a[t, :rows] > chosen.i_set_a / 2
             near &= seen.evidence.dv_pu[t, :rows] <= chosen.v_set_pu
-            found[t] = near.any(axis=0)
+            near[1:] &= seen.evidence.di1_a[t] < chosen.i_set_a  # where phases stand in
+            found[t] = near.any(axis=0) & ~seen.evidence.blocked[t]
     return found
 
 

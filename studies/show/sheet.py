@@ -81,7 +81,7 @@ def sheet_table(result: dict[str, Any]) -> str:
         ]
         if said:
             lines += ["", title, *said]
-    lines += _apart(rows)
+    lines += _apart(rows, several)
     if {row["name"] for row in result["compared"]} - {"assessed"}:
         for group, own in _by_group(result["compared"]):
             lines += ["", *_group_head(group, rows), *_comparison(own)]
@@ -178,27 +178,26 @@ def _false_trips(row: dict[str, Any]) -> str:
     return ", ".join([*said, f"and {more} more classes"] if more > 0 else said)
 
 
-def _apart(rows: list[dict[str, Any]]) -> list[str]:
-    """What is in neither count, inside the sections: shares of all terminals together."""
-    trips: dict[str, list[int]] = {}
-    alarms = [0, 0]
+def _apart(rows: list[dict[str, Any]], several: bool) -> list[str]:
+    """What is in neither count, inside the sections: the shares that trip, by terminal."""
+    lines = []
     for row in rows:
-        for own in row["classes"]:
-            if own["kind"] != "apart" or own["side"] != "inside" or own["trips"] is None:
-                continue
-            if "alarms" in own:
-                alarms = [alarms[0] + own["alarms"], alarms[1] + own["trials"]]
-            else:
-                total = trips.setdefault(class_words(own), [0, 0])
-                total[0], total[1] = total[0] + own["trips"], total[1] + own["trials"]
-    said = [f"{name} {_whole_percent(k, n)} of {n}" for name, (k, n) in trips.items()]
-    lines = wrapped(f"told apart, share that trips: {', '.join(said)}.") if said else []
-    if alarms[1]:
-        share = _whole_percent(*alarms)
-        lines += wrapped(
-            f"wiring faults at a terminal's own points: {share} of {alarms[1]} raise the alarm."
-        )
-    return ["", *lines] if lines else []
+        said = [
+            f"{class_words(own)} {_apart_share(own)}"
+            for own in row["classes"]
+            if own["kind"] == "apart" and own["side"] == "inside" and own["trips"] is not None
+        ]
+        if said:
+            lines += wrapped(f"{GAP}{row_name(row, several)}: {', '.join(said)}")
+    if not lines:
+        return []
+    head = "told apart, in neither count: the share that trips, of wiring faults the share that"
+    return ["", *wrapped(f"{head} raises the alarm"), *lines]
+
+
+def _apart_share(own: dict[str, Any]) -> str:
+    share = _whole_percent(own.get("alarms", own["trips"]), own["trials"])
+    return f"{share} of {own['trials']}"
 
 
 def _whole_percent(k: int, n: int) -> str:
