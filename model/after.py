@@ -13,7 +13,7 @@ from .states import NOT_CONVERGED, Answer, Probes, State
 __all__ = ["OVERVOLTAGE_PU", "solve_after"]
 
 OVERVOLTAGE_PU = 1.2
-"""DER trip above it at any of their windings: within 0.16 s by IEEE 1547-2018, table 11."""
+"""DER trip above it at any of their phases: within 0.16 s by IEEE 1547-2018, table 11."""
 
 
 def solve_after(
@@ -68,10 +68,14 @@ def solve_after(
 
 
 def _overvoltage(network: Network, answer: Answer) -> NDArray[np.bool_]:
-    """(S,) any DER stands above its limit."""
+    """(S,) any DER stands above its limit.
+
+    On three wires it has no neutral, and does not notice that of the network moving: there it
+    is the positive sequence that counts.
+    """
     units = network.machines.unit[network.machines.motor_load.size :]
-    highest = answer.unit_v_pu[units, :3].max(axis=(0, 1))
-    return np.asarray(highest > OVERVOLTAGE_PU)
+    seen = slice(3, 4) if network.three_wire else slice(0, 3)
+    return np.asarray(answer.unit_v_pu[units, seen].max(axis=(0, 1)) > OVERVOLTAGE_PU)
 
 
 def _some(state: State, chosen: NDArray[np.int64]) -> State:
