@@ -87,18 +87,10 @@ def _run(case: draw.Case, mix: list[draw.BlockId]) -> dict[str, Any]:
     watch = Stopwatch()
     trips = 0
     settings = reference_settings(case.study)
-    scenarios: draw.Scenarios | None = None
-
-    def frame(args: tuple[Any, ...]) -> str:
-        """The state after an event is a new one where DER carry something over."""
-        state = args[1]
-        a_guess = state.emf_pu.size < engine.BLOCK  # of where the solution before the event lies
-        first = a_guess or (scenarios is not None and state is scenarios.before)
-        return "solve before" if first else "solve after"
-
     with (
         watch.inside(draw, "draw_errors", lambda _: "noise"),
-        watch.inside(engine, "solve", frame),
+        watch.inside(engine, "solve", lambda _: "solve before"),
+        watch.inside(engine, "solve_after", lambda _: "solve after"),
     ):
         start = perf_counter()
         for which in mix:

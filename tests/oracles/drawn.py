@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from oracles.dense import DenseSolution, solve_dense
+from oracles.dense import DenseSolution, NotConvergedError, solve_dense
 from oracles.random_happenings import dense_event
 
 from openphase.detector.instruments import Errors, Wiring
 from openphase.model.events.base import Event
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network, detached_end
-from openphase.model.parts import Feeder
+from openphase.model.parts import Der, Feeder, Load
 from openphase.model.states import State
 from openphase.studies.run.cases import Case, Wired
 from openphase.studies.run.draw import Scenarios
@@ -22,6 +23,7 @@ from openphase.studies.spec.study_file import Group, SwitchState
 
 __all__ = ["Frames", "frames_of", "perfect", "reported"]
 
+MOST_PU = 1.2  #: what DER bear
 NAMES = {code: name for name, code in CONNECTIONS.items()}
 SWITCHES = frozenset[str]
 Ends = tuple[list[list[list[complex]]], list[list[list[complex]]]]
@@ -44,8 +46,12 @@ def perfect(errors: Errors) -> Errors:
 
 
 def frames_of(case: Case, scenarios: Scenarios, s: int) -> Frames:
-    """Scenario ``s``, solved by the reference, which carries DER over by itself."""
+    """Scenario ``s``, solved by the reference, which carries DER over by itself.
+
+    Where one of them then stands above what it bears, or nothing can carry its current, all trip.
+    """
     feeder, event = _as_drawn(case, scenarios, s), _one(scenarios.event, s)
+    watched = replace(feeder, loads=(*feeder.loads, *(_watch(der) for der in feeder.ders)))
     solved: list[DenseSolution] = []
     opened_in = []
     for after, wired, state in (
@@ -57,20 +63,31 @@ def frames_of(case: Case, scenarios: Scenarios, s: int) -> Frames:
             detached_end(p.name): f"{p.line}@{p.bus}" for p in feeder.points if p.name in opened
         }
         factor = float(event.emf_factor[0]) if after else 1.0
-        solved.append(
-            solve_dense(
-                feeder,
-                closed,
-                dense_event(case.network, event, detached, after=after),
-                _scales(case, state, s),
-                dict(zip(case.network.loads, state.exponent[:, s].tolist(), strict=True)),
-                _connections(case, state, s),
-                float(state.emf_pu[s]) / case.network.emf_pu / factor,
-                solved[0] if after else None,
-                before=solved[0] if after else None,
-                opened=opened,
-            )
+        solve = functools.partial(
+            solve_dense,
+            watched,
+            closed,
+            load_scale=_scales(case, state, s),
+            exponents=dict(zip(case.network.loads, state.exponent[:, s].tolist(), strict=True)),
+            connections=_connections(case, state, s),
+            emf_scale=float(state.emf_pu[s]) / case.network.emf_pu / factor,
+            start=solved[0] if after else None,
+            before=solved[0] if after else None,
+            opened=opened,
         )
+        happening = dense_event(case.network, event, detached, after=after)
+        try:
+            found = solve(happening)
+            trips = after and any(
+                found.load_pu[_watch(d).name].max() > MOST_PU for d in feeder.ders
+            )
+        except NotConvergedError:
+            if not (after and feeder.ders):
+                raise
+            trips = True
+        if trips:
+            found = solve(replace(happening, ders={der.name: 0.0 for der in feeder.ders}))
+        solved.append(found)
         opened_in.append(opened)
     return _measured(feeder, solved, opened_in)
 
@@ -99,6 +116,19 @@ def _miswired(v: list[complex], i: list[complex], kind: int) -> tuple[list[compl
     signs = [-1.0 if k in turned.get(name, []) else 1.0 for k in range(3)]
     for_i = [0, 1, 2] if name.startswith("VOLTAGES") else order
     return [v[k] for k in order], [signs[n] * i[k] for n, k in enumerate(for_i)]
+
+
+def _watch(der: Der) -> Load:
+    """Next to no load across the windings of a DER, whose voltages the reference then tells."""
+    return Load(
+        name=f"watch {der.name}",
+        transformer=der.transformer,
+        place=der.place,
+        connection="wye",
+        kw=1e-9,
+        power_factor=1.0,
+        exponent=2.0,
+    )
 
 
 def _one(event: Event, s: int) -> Event:

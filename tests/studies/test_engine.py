@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from openphase.model.states import NOT_CONVERGED
 from openphase.optimise.counts import Grid, count_tensor
 from openphase.studies.run import tally
 from openphase.studies.run.choose import gather
-from openphase.studies.run.classes import REPORTED, DrawClass, Purpose, Side
+from openphase.studies.run.classes import FALLEN, REPORTED, DrawClass, Purpose, Side
 from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case, make_cases
 from openphase.studies.run.engine import Observed, observe, options_of
 from openphase.studies.run.store import pack
@@ -41,8 +42,9 @@ SMALL = Grid(
 )
 
 NETWORK = {"SOURCE_STEP", "TIE_SWITCHING", "TRANSFER", "DER_RAMP"}
-APART = {"OPEN_THREE", "SINGLE_POLE", "FALLEN_SOURCE_SIDE", "FALLEN_LOAD_SIDE", "WIRING"}
-APART_INSIDE = {"OPEN_WITH_LOAD_STEP", "OPEN_WITH_DER_TRIP"}
+APART = {"OPEN_THREE", "WIRING"}
+APART_INSIDE = {"SINGLE_POLE", "FALLEN_SOURCE_SIDE", "FALLEN_LOAD_SIDE"}
+APART_INSIDE |= {"OPEN_WITH_LOAD_STEP", "OPEN_WITH_DER_TRIP"}
 
 BOTH = [("paper", drawn) for drawn in DrawClass if "DER" not in drawn.name]
 BOTH = [one for one in BOTH if one[1] != DrawClass.REGULATOR_TAP]
@@ -86,7 +88,8 @@ def must_trip(case: Case, drawn: DrawClass, seen: Observed, t: int) -> NDArray[n
     """Breaks on the path with something beyond them, where the terminal looks at the source."""
     if drawn != DrawClass.OPEN_PHASE or case.points.terminals[t].load_side:
         return np.zeros(SIZE, np.bool_)
-    return np.asarray((seen.side[t] == Side.PATH) & seen.connected & case.judged[t])
+    solved = seen.flags & NOT_CONVERGED == 0
+    return np.asarray((seen.side[t] == Side.PATH) & seen.connected & case.judged[t] & solved)
 
 
 def must_not_trip(case: Case, drawn: DrawClass, seen: Observed, t: int) -> NDArray[np.bool_]:
@@ -339,9 +342,14 @@ def test_judged_blocks_count_what_the_verdicts_say(kind: str, drawn: DrawClass) 
             np.full(SIZE, Reason.BLOCKED) if one is None else verdict(known.evidence, one)[t]
             for one in settings
         ]
-        trip = [own == Reason.TRIP for own in reasons]
         breaks = np.full(SIZE, drawn == DrawClass.OPEN_PHASE) & (known.side[t] == Side.PATH)
         opens = breaks & known.connected
+        # a break without a solution is no find
+        reasons = [
+            np.where(opens & (known.flags & NOT_CONVERGED != 0), Reason.BLOCKED, own)
+            for own in reasons
+        ]
+        trip = [own == Reason.TRIP for own in reasons]
         assert tested.reachable[t] == opens.sum()
         assert tested.found[:, t].tolist() == [int((own & opens).sum()) for own in trip]
         missed = np.bincount(reasons[0][opens & ~trip[0]], minlength=len(Reason))
@@ -353,8 +361,12 @@ def test_judged_blocks_count_what_the_verdicts_say(kind: str, drawn: DrawClass) 
             assert tested.alarms[r, t] == ((alarm[t] != 0) & members).sum()
             near, one = 0, settings[0]
             if one is not None:
-                di1_a, dv1_pu = known.evidence.di1_a[t], known.evidence.dv1_pu[t]
-                close = (di1_a > one.i_set_a / 2.0) & (dv1_pu <= one.v_set_pu)
+                # by any row that its options judge by
+                rows = range(4 if one.options.fallback else 1)
+                close = np.zeros(SIZE, np.bool_)
+                for k in rows:
+                    moved = known.evidence.di_a[t, k] > one.i_set_a / 2.0
+                    close |= moved & (known.evidence.dv_pu[t, k] <= one.v_set_pu)
                 near = int((close & members).sum())
             assert tested.effective[r, t] == near
         everywhere = replace(case, judged=np.ones_like(case.judged))
@@ -397,6 +409,31 @@ def test_pictures_show_the_first_events_by_the_setting_s_own_options(kind: str) 
         size = np.abs(known.evidence.z1_ohm[t])
         rows = (reach.di_a[t, 0], reach.dv_pu[t, 0], size, reach.z_ohm[t, 0], reason)
         np.testing.assert_array_equal(tested.sample[t], np.stack(rows)[:, :kept])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("drawn", [*FALLEN, DrawClass.OPEN_PHASE, DrawClass.EARTH_FAULT])
+def test_fallen_conductors_inside_are_counted_by_their_resistance(
+    kind: str, drawn: DrawClass
+) -> None:
+    case, (tested, known) = case_of(kind), judged_of(kind, drawn)
+    if drawn not in FALLEN:
+        assert not tested.fallen.any()
+        return
+    event = draw_scenarios(case, block(case, drawn, 1, Purpose.VALIDATE), SIZE).event
+    source_side = drawn == DrawClass.FALLEN_SOURCE_SIDE
+    lies = event.earth_after_s if source_side else event.fallen_after_s
+    ohm = 1.0 / np.abs(lies).max(axis=0)
+    reason = unpack_verdicts(tested.verdicts)[0]
+    for t in range(len(case.points.terminals)):
+        inside = np.isin(known.side[t], [Side.PATH, Side.LATERAL])
+        for b, (low, high) in enumerate(pairwise([0.0, 100.0, 500.0, np.inf])):
+            own = inside & (ohm >= low) & (ohm < high)
+            counts = [own.sum(), (own & (reason[t] == Reason.TRIP)).sum()]
+            assert tested.fallen[FALLEN.index(drawn), b, t].tolist() == counts
+    others = [n for n, own in enumerate(FALLEN) if own != drawn]
+    assert not tested.fallen[others].any()
+    assert tested.fallen[..., 1].any()
 
 
 def test_alarms_are_for_wrong_wiring() -> None:
