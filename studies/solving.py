@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..detector.criteria import Options, Reason, Settings, reach_of, verdict
 from ..detector.evidence import Evidence, Phasors, evidence_of, only
 from ..model.errors import Fault, InputError, OpenPhaseError, Report
+from ..model.machines import carried_over
 from ..model.network import Network, compile_network, locate
 from ..model.parts import Feeder
 from ..model.points import Points, find_points, into_line
@@ -132,11 +133,12 @@ def solve_break(
     network = compile_network(feeder, closed)
     edge, share = locate(network, broken.line, broken.fraction)
     intact = steady_state(network)._replace(edge=np.array([edge]), share=np.array([share]))
-    opened = intact._replace(open_mask=np.array([sum(1 << a for a in broken.phases)]))
     before = solve(network, intact)
+    opened = intact._replace(open_mask=np.array([sum(1 << a for a in broken.phases)]))
+    opened = carried_over(network, intact, before, opened, np.ones((len(feeder.ders), 1)))
     after = solve(network, opened, start=before.unit_v_pu)
     if (before.flags[0] | after.flags[0]) & NOT_CONVERGED:
-        raise OpenPhaseError(f"{feeder.name}: voltage-dependent loads did not settle")
+        raise OpenPhaseError(f"{feeder.name}: loads or generation did not settle")
     if not all(np.isfinite(part).all() for part in (before.v, before.i, after.v, after.i)):
         raise OpenPhaseError(f"{feeder.name}: no finite solution; look for absurd values")
     lost = _lost_phases(broken, int(after.flags[0]))
