@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..detector.criteria import Options, Reason, Settings, reach_of, verdict
 from ..detector.evidence import Evidence, Phasors, evidence_of, only
+from ..model.after import solve_after
 from ..model.errors import Fault, InputError, OpenPhaseError, Report
-from ..model.machines import carried_over
 from ..model.network import Network, compile_network, locate
 from ..model.parts import Feeder
 from ..model.points import Points, find_points, into_line
@@ -127,6 +127,9 @@ def solve_break(
 ) -> dict[str, Any]:
     """Phasors before and after the break and each terminal's view, without any noise.
 
+    DER keep what they had before the break, or all trip where that leaves one of them above
+    its voltage, as in every study.
+
     Returns what ``solve --json`` prints: volts to earth and amperes positive into the
     line, complex numbers as [re, im], null where a conductor floats.
     """
@@ -135,8 +138,7 @@ def solve_break(
     intact = steady_state(network)._replace(edge=np.array([edge]), share=np.array([share]))
     before = solve(network, intact)
     opened = intact._replace(open_mask=np.array([sum(1 << a for a in broken.phases)]))
-    opened = carried_over(network, intact, before, opened, np.ones((len(feeder.ders), 1)))
-    after = solve(network, opened, start=before.unit_v_pu)
+    after = solve_after(network, (intact, before), opened, (np.ones((len(feeder.ders), 1)), None))
     if (before.flags[0] | after.flags[0]) & NOT_CONVERGED:
         raise OpenPhaseError(f"{feeder.name}: loads or generation did not settle")
     if not all(np.isfinite(part).all() for part in (before.v, before.i, after.v, after.i)):

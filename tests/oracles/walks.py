@@ -44,9 +44,7 @@ def in_state(feeder: Feeder, closed: Collection[str], opened: Collection[str]) -
             k = next(k for k, line in enumerate(lines) if line.name == point.line)
             end = f"{point.name}:open"
             at_from = lines[k].from_bus == point.bus
-            lines[k] = (
-                replace(lines[k], from_bus=end) if at_from else replace(lines[k], to_bus=end)
-            )
+            lines[k] = replace(lines[k], from_bus=end) if at_from else replace(lines[k], to_bus=end)
             points[n] = replace(point, bus=end)
     return replace(
         feeder,
