@@ -5,23 +5,27 @@ only what a feeder in service cannot be. It sees
 
 - swapped phases, or voltages alone: the negative sequence of V exceeds the positive;
 - rotated phases at one end: the two ends' V1 lie far apart;
+- two currents interchanged: I2 at least twice I1 and I0, beside voltages that have next to
+  no V2, which no load makes; interchanging any two phases swaps the sizes of I1 and I2;
 - one reversed current transformer: I2 or I0 exceeds I1, which no load makes that takes power
   in every phase, and turning one phase's current round leaves little of either. Seen
   whatever the phase while the true |I2| and |I0| are below a seventh of |I1|, and up to half
   of it for favourable angles. Where the section can be fed from both sides, phases may in truth
-  carry power in opposite directions; there the turn must also balance what the section takes,
-  the sum of the currents into it;
-- all current transformers of one end reversed: power flows into the section at both ends, or
-  out of it at both. Only where the section can be fed from one side alone.
+  carry power in opposite directions; there the turn, or the interchange, must also balance what
+  the section takes, the sum of the currents into it;
+- all current transformers of one end reversed: power flows out of the section at the end towards
+  the source, or into it at the other. Only where the section can be fed from one side alone.
 
-It does not see: currents below ``least_a``; labels wrong at both ends alike, or currents alone
-wrong by whole rotations; a reversal of all currents in a closed loop or beside generation; one
-reversed transformer in a current that is itself very unbalanced. And beside generation together
-with much one-phase load a phase may rightly carry power against the others: a false alarm.
+It does not see: currents below ``least_a``, so nothing at a point through which none flows;
+labels wrong at both ends alike, or currents alone wrong by whole rotations; a reversal of all
+currents in a closed loop or beside generation; one reversed or two interchanged in a current that
+is itself very unbalanced. And beside generation together with much load on one or two phases a
+phase may rightly carry power against the others: a false alarm.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -45,8 +49,9 @@ class Alarm(IntEnum):
     NONE = 0
     PHASE_ORDER = 1
     ENDS_APART = 2
-    ONE_CURRENT = 3
-    ALL_CURRENTS = 4
+    CURRENT_ORDER = 3
+    ONE_CURRENT = 4
+    ALL_CURRENTS = 5
 
     @property
     def text(self) -> str:
@@ -58,8 +63,9 @@ _TEXT = {
     Alarm.NONE: "none",
     Alarm.PHASE_ORDER: "voltages in the wrong phase order: |V2| above |V1|",
     Alarm.ENDS_APART: "V1 of the two ends far apart: labels rotated?",
+    Alarm.CURRENT_ORDER: "two currents interchanged: |I2| far above |I1|",
     Alarm.ONE_CURRENT: "one current reversed: |I2| or |I0| above |I1|",
-    Alarm.ALL_CURRENTS: "all currents of one end reversed: no power passes the section",
+    Alarm.ALL_CURRENTS: "all currents of one end reversed: power flows towards the source",
 }
 
 
@@ -75,19 +81,25 @@ class Limits:
     apart_pu : float
         How far V1 of the two ends may lie apart, per unit of the larger: 29° or half its size.
         A section drops a tenth at most; a rotation makes 1.73.
+    unbalance_pu : float
+        V2 up to which interchanged currents are judged: twice what a supply may have for long
+        (2 %, EN 50160) and some more. Above it motors and generators may in truth take more I2
+        than I1, as beside a fault between two phases.
     least_a : float
         Positive-sequence current, for the direction of power its active part, below which
         currents are not judged: twenty times the error floor of 0.05 A of the contract.
     turned : float
-        Share of I1 that I2 and I0 may have once the suspected current is turned round.
+        Share of I1 that I2 and I0 may have once the suspected current is turned round, or the
+        suspected two are put back.
     taken : float
-        Share that must be left of I2 and I0 of the sum of both ends' currents by the turn, at
-        most. In the paper's closed loop, with up to 500 kW on one phase anywhere, no state of
-        16,000 was doubted at a quarter, 140 at a half.
+        Share that may be left of I2 and I0 of the sum of both ends' currents once the suspected
+        are turned round or put back. In the paper's closed loop, with up to 500 kW on one phase
+        anywhere, no state of 16,000 was doubted at a quarter, 140 at a half.
     """
 
     live_pu: float = 0.8
     apart_pu: float = 0.5
+    unbalance_pu: float = 0.05
     least_a: float = 1.0
     turned: float = 0.5
     taken: float = 0.25
@@ -126,8 +138,10 @@ def wiring_alarm(
         raise ValueError("wiring is judged by both ends: give both directions of each section")
     live = (np.abs(v) >= limits.live_pu * v_nominal_v).all(axis=1)
     v1 = positive_sequence(v)
-    disordered = live & (np.abs(negative_sequence(v)) > np.abs(v1))
-    turned = _turned(i, limits)
+    v2 = np.abs(negative_sequence(v))
+    disordered = live & (v2 > np.abs(v1))
+    orderly = live & (v2 <= limits.unbalance_pu * v_nominal_v)
+    turned, crossed = _turned(i, limits), _crossed(i, limits) & orderly[:, None]
     active_a = (positive_sequence(i) * v1.conj()).real / v_nominal_v
     alarm = np.zeros((len(terminals), v.shape[-1]), np.int8)
     for t, terminal in enumerate(terminals):
@@ -139,13 +153,17 @@ def wiring_alarm(
         sure = one_way is not None and bool(one_way[t])
         # the last assignment wins: what is told first is written last
         if sure:
-            inward = active_a[ends] * into[:, None]
-            both = (inward >= limits.least_a).all(axis=0) | (inward <= -limits.least_a).all(axis=0)
-            alarm[t, both] = Alarm.ALL_CURRENTS
-        one = turned[ends]
-        if not sure and one.any():
-            one = _balanced_by_turn(i[ends] * into[:, None, None], one, limits)
-        alarm[t, one.any(axis=(0, 1))] = Alarm.ONE_CURRENT
+            onward = np.where([terminal.load_side, not terminal.load_side], -into, into)
+            back = active_a[ends] * onward[:, None] <= -limits.least_a
+            alarm[t, back.any(axis=0)] = Alarm.ALL_CURRENTS
+        for suspect, mend, doubt in (
+            (turned, _turn, Alarm.ONE_CURRENT),
+            (crossed, _cross, Alarm.CURRENT_ORDER),
+        ):
+            found = suspect[ends]
+            if not sure and found.any():
+                found = _balanced_by(mend, i[ends] * into[:, None, None], found, limits)
+            alarm[t, found.any(axis=(0, 1))] = doubt
         gap = np.abs(v1[ends[0]] - v1[ends[1]])
         apart = gap > limits.apart_pu * np.abs(v1[ends]).max(axis=0)
         alarm[t, apart & live[ends].all(axis=0)] = Alarm.ENDS_APART
@@ -174,14 +192,26 @@ def _turned(i: Complex, limits: Limits) -> Flags:
     return found
 
 
-def _balanced_by_turn(inward: Complex, turned: Flags, limits: Limits) -> Flags:
-    """Those of ``turned`` (2 ends, 3, S) without which the section takes balanced current."""
-    found = turned.copy()
+def _crossed(i: Complex, limits: Limits) -> Flags:
+    """(P, 3, S): phases k whose current, of (P, 3, S), seems to be that of k+1 and the reverse.
+
+    The sizes of I1, I2 and I0 do not say which two: all three pairs, or none.
+    """
+    i1, size, i0 = _sizes(i)
+    found = (np.maximum(i1, i0) <= limits.turned * size) & (size >= limits.least_a)
+    return np.repeat(found[:, None], 3, axis=1)
+
+
+def _balanced_by(
+    mend: Callable[[Complex, int], Complex], inward: Complex, suspect: Flags, limits: Limits
+) -> Flags:
+    """Those of ``suspect`` (2 ends, 3, S) that, mended, let the section take balanced current."""
+    found = suspect.copy()
     taken = inward.sum(axis=0)
     _, i2, i0 = _sizes(taken)
     most = limits.taken * np.maximum(i2, i0)
-    for end, k in np.argwhere(turned.any(axis=-1)):
-        _, i2, i0 = _sizes(taken - inward[end] + _turn(inward[end], k))
+    for end, k in np.argwhere(suspect.any(axis=-1)):
+        _, i2, i0 = _sizes(taken - inward[end] + mend(inward[end], k))
         found[end, k] &= np.maximum(i2, i0) <= most
     return found
 
@@ -195,4 +225,11 @@ def _turn(i: Complex, k: int) -> Complex:
     """(3, S) with phase k turned round."""
     other = i.copy()
     other[k] *= -1.0
+    return other
+
+
+def _cross(i: Complex, k: int) -> Complex:
+    """(3, S) with phases k and k+1 interchanged."""
+    other = i.copy()
+    other[[k, (k + 1) % 3]] = i[[(k + 1) % 3, k]]
     return other

@@ -2,13 +2,19 @@
 
 Within a loop the far side of a break is fed the other way round, so a break in the section
 shows |Z| = |Z_loop - Z_section| instead of the large impedance of the loads. Z_set must stay
-below that by a margin m2, and above what harmless events show, the section's own impedance, by
-a margin m1:
+below that by a margin m2. What happens outside the section shows the section's own impedance,
+and Z_set must stay above that by a margin m1:
 
     m1 |Z_section| <= Z_set <= |Z_loop - Z_section| / m2
 
 which a section can meet only up to |Z_loop| / (1 + m1 m2), where section and loop have one
 angle. The paper's "less than the total line impedance" (section V) leaves more than there is.
+
+The lower bound is worth no more than that. What happens inside the section may show more
+without being a break: a load near an end 1.37 of 0.85 ohm in the paper's loop, and phases that
+close inside the very |Z_loop - Z_section| of their opening, which no Z_set in the window keeps
+out, however short the section is. So a window only says where to look; whether a setting in it
+is secure is for the sample of harmless events to say.
 """
 
 from __future__ import annotations

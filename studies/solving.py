@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..detector.criteria import Options, Reason, Settings, reach_of, verdict
 from ..detector.evidence import Evidence, Phasors, evidence_of, only
+from ..model.after import solve_after
 from ..model.errors import Fault, InputError, OpenPhaseError, Report
 from ..model.network import Network, compile_network, locate
 from ..model.parts import Feeder
@@ -126,17 +127,20 @@ def solve_break(
 ) -> dict[str, Any]:
     """Phasors before and after the break and each terminal's view, without any noise.
 
+    DER keep what they had before the break, or all trip where that leaves one of them above
+    its voltage, as in every study.
+
     Returns what ``solve --json`` prints: volts to earth and amperes positive into the
     line, complex numbers as [re, im], null where a conductor floats.
     """
     network = compile_network(feeder, closed)
     edge, share = locate(network, broken.line, broken.fraction)
     intact = steady_state(network)._replace(edge=np.array([edge]), share=np.array([share]))
-    opened = intact._replace(open_mask=np.array([sum(1 << a for a in broken.phases)]))
     before = solve(network, intact)
-    after = solve(network, opened, start=before.unit_v_pu)
+    opened = intact._replace(open_mask=np.array([sum(1 << a for a in broken.phases)]))
+    after = solve_after(network, (intact, before), opened, (np.ones((len(feeder.ders), 1)), None))
     if (before.flags[0] | after.flags[0]) & NOT_CONVERGED:
-        raise OpenPhaseError(f"{feeder.name}: voltage-dependent loads did not settle")
+        raise OpenPhaseError(f"{feeder.name}: loads or generation did not settle")
     if not all(np.isfinite(part).all() for part in (before.v, before.i, after.v, after.i)):
         raise OpenPhaseError(f"{feeder.name}: no finite solution; look for absurd values")
     lost = _lost_phases(broken, int(after.flags[0]))

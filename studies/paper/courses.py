@@ -42,7 +42,7 @@ class Trace:
     label: str
     x: Real
     y: Real
-    fit: bool = False  #: rests on a fitted value
+    basis: str = ""  #: said of it in the legend, as in the table: a fit, a variant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,14 +71,14 @@ def paper_panels(feeder: Feeder) -> dict[str, tuple[Panel, ...]]:
         "fig11": (
             _impedances(
                 "Fig. 11: Z1 of section (R1, R2), external open phase",
-                [(f"at {m}", case, m, n, "1", False) for m, n in (("R1", "R2"), ("R2", "R1"))],
+                [(f"at {m}", case, m, n, "1", "") for m, n in (("R1", "R2"), ("R2", "R1"))],
                 ("z1_r1_ohm",),
             ),
         ),
         "fig12": (
             _impedances(
                 "Fig. 12: Z1 of section (R2, R3), internal open phase; Re Z1 < 0",
-                [("at R2", case, "R2", "R3", "1", False)],
+                [("at R2", case, "R2", "R3", "1", "")],
                 ("z1_r2_ohm",),
             ),
         ),
@@ -115,7 +115,7 @@ def _waves(case: Case, frequency_hz: float) -> tuple[Panel, Panel]:
                         label=f"phase {p.upper()}",
                         x=t,
                         y=scale * np.sqrt(2.0) * (phasors[p][now] * turn).real,
-                        fit=True,
+                        basis="fit",
                     )
                     for p in PHASES
                 ),
@@ -136,7 +136,7 @@ def _change(case: Case, what: str, y_label: str, threshold: str, value: float) -
         x_label="time [s]",
         y_label=y_label,
         traces=tuple(
-            Trace(label=words, x=t, y=np.where(within, size("R3", part), 0.0), fit=True)
+            Trace(label=words, x=t, y=np.where(within, size("R3", part), 0.0), basis="fit")
             for part, words in parts
         ),
         printed=(printed,),
@@ -145,8 +145,8 @@ def _change(case: Case, what: str, y_label: str, threshold: str, value: float) -
     )
 
 
-Curve = tuple[str, Case, str, str, Part, bool]
-"""Label, case, local, remote, quantity, whether it rests on a fit."""
+Curve = tuple[str, Case, str, str, Part, str]
+"""Label, case, local, remote, quantity, and what to say of it: a fit, a variant."""
 
 
 def _impedances(
@@ -157,9 +157,9 @@ def _impedances(
     now = (t >= event_s).astype(np.int64)
     earlier = (t - WINDOW_S >= event_s).astype(np.int64)
     traces = []
-    for label, case, local, remote, part, fit in curves:
+    for label, case, local, remote, part, basis in curves:
         z = np.abs(case.z_between(local, remote, part, now, earlier))
-        traces.append(Trace(label=label, x=t, y=np.where(now == earlier, np.nan, z), fit=fit))
+        traces.append(Trace(label=label, x=t, y=np.where(now == earlier, np.nan, z), basis=basis))
     return Panel(
         title=title,
         x_label="time [s]",
@@ -172,7 +172,7 @@ def _impedances(
 
 def _figure_13(feeder: Feeder) -> Panel:
     curves: list[Curve] = [
-        (f"{n} Yg/Δ", open_phase_a(yg_d(feeder, *more)), "R2", "R3", "a", True)
+        (f"{n} Yg/Δ", open_phase_a(yg_d(feeder, *more)), "R2", "R3", "a", "fit")
         for n, more in enumerate(MORE_YG_D, start=1)
     ]
     names = tuple(f"z_a_{n}_ohm" for n in (1, 2, 3))
@@ -183,7 +183,7 @@ def _figure_14(feeder: Feeder) -> Panel:
     printed_data = open_phase_a(feeder, tie_closed=True)
     other = open_phase_a(line_ohm(feeder, "R3-R4", OTHER_R3_R4_OHM), tie_closed=True)
     curves: list[Curve] = [
-        (f"at {m}, (R3, R4) {words}", case, m, n, "1", case is other)
+        (f"at {m}, (R3, R4) {words}", case, m, n, "1", "variant" if case is other else "")
         for case, words in (
             (printed_data, "as printed"),
             (other, f"of {OTHER_R3_R4_OHM:g} Ω"),
@@ -197,11 +197,11 @@ def _figure_15(feeder: Feeder) -> tuple[Panel, Panel]:
     wanted = PRINTED["pv_ohm"].value
     stiff = pv_impedance(feeder, 90.0, wanted)
     cases: list[Curve] = [
-        (words, open_phase_a(pv), "R2", "R3", "1", fit)
-        for words, pv, fit in (
-            (f"EMF behind {abs(stiff):.1f} Ω at 90°", with_pv(feeder, "thevenin", stiff), True),
-            ("constant current", with_pv(feeder, "constant_current"), False),
-            ("constant power; Re Z1 > 0", with_pv(feeder, "constant_power"), False),
+        (words, open_phase_a(pv), "R2", "R3", "1", basis)
+        for words, pv, basis in (
+            (f"EMF behind {abs(stiff):.1f} Ω at 90°", with_pv(feeder, "thevenin", stiff), "fit"),
+            ("constant current", with_pv(feeder, "constant_current"), "variant"),
+            ("constant power; Re Z1 > 0", with_pv(feeder, "constant_power"), "variant"),
         )
     ]
     course = _impedances(

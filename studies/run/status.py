@@ -33,6 +33,20 @@ __all__ = [
 FEW_EFFECTIVE = 0.1  #: below this share of effective trials, zero trips show little
 NAMED = 3  #: classes that a reason names before it only counts the rest
 
+#: all three phases change alike, but for windings and loads that are not balanced
+BALANCED = (
+    DrawClass.SOURCE_STEP,
+    DrawClass.CAPACITOR_STEP,
+    DrawClass.MOTOR_START,
+    DrawClass.REGULATOR_TAP,
+    DrawClass.TIE_SWITCHING,
+    DrawClass.TRANSFER,
+    DrawClass.DER_TRIP,
+    DrawClass.DER_RAMP,
+    DrawClass.ENERGISATION,
+    DrawClass.RECLOSING,
+)
+
 LOAD_SIDE = "with the section cut, nothing behind this terminal feeds it"
 
 WORDS = {(own.name, own.side): own.words for own in REPORTED}
@@ -152,19 +166,27 @@ def nearest_false_trip(
 
 
 def refusal_text(groups: Sequence[Case], t: int, refusal: Refusal, front: Front) -> str:
-    """Why a terminal has no setting for these groups, and what would help."""
+    """Why a terminal has no setting for these groups, and what may help."""
     if refusal.obstacle in (Obstacle.EMPTY_WINDOW, Obstacle.COARSE_DEVICE):
         return _closed_loops(groups, t, refusal)
+    own = groups[0].study
+    margin = own.certificate.margin
+    blocking = _blocking(margin, refusal, front)
     which = "the device"
-    advice = (
-        "A lower margin, or a device with larger I_set and Z_set or a smaller V_set, would help"
-    )
+    ways = ["a lower margin"]
     if refusal.obstacle is Obstacle.WINDOW_MARGIN:
         which = f"the closed loop's window of Z_set, {_span(common_window(groups, t))},"
-        advice = "An open loop, a shorter section or a device with a smaller V_set would help"
-    margin = groups[0].study.certificate.margin
-    blocking = _blocking(margin, refusal, front)
-    return f"no setting of {which} keeps the margin {margin:g} in training{blocking}. {advice}"
+        ways += ["a device with a smaller V_set", "an open loop"]
+    else:
+        ways += ["a device with larger I_set and Z_set or a smaller V_set"]
+    if blocking and blocking[0] in BALANCED and not own.detector.unbalance:
+        ways.insert(0, "the detector's option unbalance, since these are balanced")
+    said = f"no setting of {which} keeps the margin {margin:g} in training"
+    if refusal.closest is not None and blocking:
+        kept = math.floor(refusal.closest.margin * 100) / 100
+        drawn, share = blocking
+        said += f": the most secure keeps {kept:g}; {share:.0%} of what blocks it are {drawn.words}"
+    return f"{said}. What may help: {_any_of(ways)}"
 
 
 def refusal_in_brief(study: Study, refusal: Choice | Refusal, limit: str = "") -> str | None:
@@ -177,22 +199,30 @@ def refusal_in_brief(study: Study, refusal: Choice | Refusal, limit: str = "") -
     return f"no setting{limit}{loop} keeps the margin {study.certificate.margin:g}"
 
 
-def _blocking(margin: float, refusal: Refusal, front: Front) -> str:
-    """What the most secure setting keeps, and which class blocks it most."""
+def _blocking(margin: float, refusal: Refusal, front: Front) -> tuple[DrawClass, float] | None:
+    """The class that blocks the most secure setting most, and its share of the events that do."""
     own = refusal.closest
     if own is None or not front.size:
-        return ""
+        return None
     settings = (np.array([x]) for x in (own.i_set_a, own.v_set_pu, own.z_set_ohm))
     each = factors(front, *settings)[:, 0]
-    blocking = front.scenario[each < margin, 0]
+    # an event may have several rows, one for each way to trip
+    blocking = np.unique(front.scenario[each < margin], axis=0)[:, 0]
     if not blocking.size:
-        return ""
+        return None
     drawn = DrawClass(int(np.bincount(blocking).argmax()))
-    share = float((blocking == drawn).mean())
-    return (
-        f": the most secure keeps {math.floor(own.margin * 100) / 100:g}; {share:.0%} of what "
-        f"blocks it are {drawn.words}"
-    )
+    return drawn, float((blocking == drawn).mean())
+
+
+def _any_of(ways: list[str]) -> str:
+    """Ways to choose from, in words.
+
+    Examples
+    --------
+    >>> _any_of(["a", "b", "c"]), _any_of(["a"])
+    ('a, b, or c', 'a')
+    """
+    return ", ".join([*ways[:-1], f"or {ways[-1]}"]) if len(ways) > 1 else ways[0]
 
 
 # ---- of a closed loop ----
@@ -227,7 +257,7 @@ def loop_note(case: Case, t: int, z_set_ohm: float) -> str | None:
 
 
 def _closed_loops(groups: Sequence[Case], t: int, refusal: Refusal) -> str:
-    """Why closed loops leave no Z_set that the device can hold, and what would help."""
+    """Why closed loops leave no Z_set that the device can hold, and what may help."""
     looped = [case for case in groups if window_of(case, t) is not None]
     separate = " or settings of their own for each group" if len(groups) > 1 else ""
     if len(looped) > 1:
@@ -238,21 +268,23 @@ def _closed_loops(groups: Sequence[Case], t: int, refusal: Refusal) -> str:
     assert terminal.loop_z1_ohm is not None
     (m1, m2), whole = margins, terminal.loop_z1_ohm
     section, rest = abs(terminal.line_z1_ohm), abs(whole - terminal.line_z1_ohm)
-    none = "no Z_set is"
+    found = remedy(terminal.line_z1_ohm, whole, margins, np.array(case.study.device.z_grid()))
+    none, ways = "no Z_set is", []
     if refusal.obstacle is Obstacle.COARSE_DEVICE:
         none = "no Z_set of the device is"
-    found = remedy(terminal.line_z1_ohm, whole, margins, np.array(case.study.device.z_grid()))
-    ways = [f"a section of at most {_down(found.longest_section_ohm)} Ω"]
+        ways.append(f"a device with a Z_set of {_span(window_of(case, t))}")
+    if found.longest_section_ohm > 0:
+        ways.append(f"a section of at most {_down(found.longest_section_ohm)} Ω")
     ways += [
         f"a loop margin {name} of at most {_down(value)} instead of {now:g}"
         for name, value, now in (("m1", found.m1, m1), ("m2", found.m2, m2))
         if 1.0 <= value < now
     ]
+    ways.append(f"an open loop{separate}")
     return (
         f"closed loop: Z_set must be at least {m1:g} times the section's {section:.3g} Ω, that is "
         f"{m1 * section:.3g} Ω, and at most the {rest:.3g} Ω that a break inside shows, divided by "
-        f"{m2:g}, that is {rest / m2:.3g} Ω; {none}. What would help: {', '.join(ways)}, or an "
-        f"open loop{separate}"
+        f"{m2:g}, that is {rest / m2:.3g} Ω; {none}. What may help: {_any_of(ways)}"
     )
 
 

@@ -94,7 +94,7 @@ def plot_panel(panel: Panel, ax: Axes | None = None) -> Axes:
 
 def _label(trace: Trace, *, with_value: bool) -> str:
     value = f": {np.nanmax(trace.y):.4g}" if with_value else ""
-    return f"{trace.label}{value}{' (fit)' if trace.fit else ''}"
+    return f"{trace.label}{value}{f' ({trace.basis})' if trace.basis else ''}"
 
 
 def _over_the_window(ax: Axes, panel: Panel, window_s: tuple[float, float]) -> None:

@@ -244,8 +244,53 @@ def test_one_of_the_sequences_above_the_first_is_enough(sequence: int) -> None:
         assert (found[0, 0] == Alarm.ONE_CURRENT) == (kind == Wiring.REVERSED_A)
 
 
+def interchanged(phasors: Phasors, point: int, first: int, second: int) -> Phasors:
+    """Two currents of a point under each other's name."""
+    i = phasors.i.copy()
+    i[:, point, [first, second]] = phasors.i[:, point, [second, first]]
+    return replace(phasors, i=i)
+
+
+@pytest.mark.parametrize("build", [radial, loop, with_pv])
+@pytest.mark.parametrize("pair", [(0, 1), (1, 2), (2, 0)])
+def test_two_interchanged_currents_are_seen_from_a_little_current_on(
+    build: Build, pair: tuple[int, int]
+) -> None:
+    """In balanced service, whichever way power may flow; idle points never."""
+    at = build()
+    rng = np.random.default_rng(69)
+    state = states(at, rng, 300)
+    true = true_phasors(at, state, state)
+    phasors, current = measured(at, true, 70), through_a(true)
+    for point in range(len(at.points.names)):
+        found = alarms(at, interchanged(phasors, point, *pair))
+        mine, loaded = concerned(at, point), current[point] > 1.05 * LIMITS.least_a
+        assert (found[mine][:, loaded] == Alarm.CURRENT_ORDER).all()
+        assert (found[mine][:, current[point] < 0.9 * LIMITS.least_a] == Alarm.NONE).all()
+        assert (found[~mine] == Alarm.NONE).all()
+
+
+def test_interchanged_currents_are_not_doubted_beside_unbalanced_or_low_voltages() -> None:
+    """Voltages that are far from balanced may drive |I2| above |I1| into motors."""
+    at = radial()
+    turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
+    v = np.broadcast_to(7000.0 * turn, (2, 6, 3, 1)).copy()
+    phasors = Phasors(v=v, i=np.broadcast_to(10.0 * turn.conj(), (2, 6, 3, 1)))
+    everywhere = np.ones(len(at.points.terminals), np.bool_)
+
+    def found() -> NDArray[np.int8]:
+        return wiring_alarm(phasors, at.points.terminals, 7000.0, everywhere)
+
+    assert (found() == Alarm.CURRENT_ORDER).all()
+    v[:, :, 0] *= 0.82  # |V2| is 6 %
+    assert (found() == Alarm.NONE).all()
+    v *= 0.7  # balanced again, but dead
+    v[:, :, 0] /= 0.82
+    assert (found() == Alarm.NONE).all()
+
+
 def test_all_currents_reversed_where_power_passes_one_way() -> None:
-    """R4, R4b and R5 have no power passing their sections, and are not seen."""
+    """At R3 and R5 too, behind which is only load; nothing passes R4 and R4b: not seen."""
     at = radial()
     state = states(at, np.random.default_rng(61))
     true = true_phasors(at, state, state)
@@ -258,10 +303,10 @@ def test_all_currents_reversed_where_power_passes_one_way() -> None:
     assert seen == {
         "R1": {"R1→R2", "R2→R1"},
         "R2": {"R1→R2", "R2→R1", "R2→R3", "R3→R2"},
-        "R3": {"R2→R3", "R3→R2"},
+        "R3": {"R2→R3", "R3→R2", "R3→R4", "R4→R3"},
         "R4": set(),
         "R4b": set(),
-        "R5": set(),
+        "R5": {"R4b→R5", "R5→R4b"},
     }
 
 
@@ -287,7 +332,7 @@ def test_share_seen_beside_one_phase_load() -> None:
             found = alarms(at, wrong(phasors, point, Wiring.REVERSED_A))[concerned(at, point)]
             shares[build.__name__, name] = float((found != 0).mean())
     assert shares["radial", "R1"] > 0.98
-    assert shares["radial", "R3"] == pytest.approx(0.84, abs=0.04)
+    assert shares["radial", "R3"] == pytest.approx(0.88, abs=0.03)
     assert shares["loop", "R1"] == pytest.approx(0.87, abs=0.03)
     assert shares["loop", "R3"] == pytest.approx(0.31, abs=0.04)
 
@@ -299,8 +344,7 @@ def test_wrong_wiring_alarms_and_does_not_trip() -> None:
     """Steps of load at every point and kind of wrong wiring, at the paper's settings.
 
     Unsupervised, wrong labels make breaks of hundreds of them. Supervised, what trips is what
-    trips with the right wiring too; but for all currents reversed where no power passes (R3
-    towards R4), which is not seen.
+    trips with the right wiring too.
     """
     at = radial()
     rng = np.random.default_rng(67)
@@ -320,11 +364,10 @@ def test_wrong_wiring_alarms_and_does_not_trip() -> None:
     np.testing.assert_array_equal(right, trips(phasors, False))
     unsupervised = dict.fromkeys(KINDS, 0)
     for kind in KINDS:
-        for point, name in enumerate(at.points.names):
+        for point in range(len(at.points.names)):
             reported, mine = wrong(phasors, point, kind), concerned(at, point)
             unsupervised[kind] += int((trips(reported, False) & ~right)[mine].sum())
-            more = (trips(reported, True) & ~right)[mine]
-            assert not more.any() or (kind, name) == (Wiring.REVERSED_ALL, "R3")
+            assert not (trips(reported, True) & ~right)[mine].any()
     assert all(unsupervised[kind] > 100 for kind in LABELS)
 
 

@@ -36,6 +36,7 @@ from openphase.studies.run.status import (
     scenario_name,
     window_of,
 )
+from openphase.studies.spec.device import Steps
 from openphase.studies.spec.study_file import Group, default_study
 
 HEAD, HEAD_AWAY = 0, 1  # R1→R2, R2→R1
@@ -502,7 +503,61 @@ def test_no_margin_names_what_blocks(case: Case) -> None:
     assert said.startswith("no setting of the device keeps the margin 1.25 in training")
     assert "the most secure keeps 1.01;" in said  # never rounded up
     assert "67% of what blocks it are load steps" in said
-    assert "would help" in said
+    assert said.endswith(
+        "What may help: a lower margin, or a device with larger I_set and Z_set or a smaller V_set"
+    )
+
+
+def test_what_blocks_is_counted_by_events_not_by_their_ways_to_trip(case: Case) -> None:
+    """One step with three rows on the front, beside two earth faults with one each."""
+    training = front(
+        (9.0, 0.001, 200.0, DrawClass.LOAD_STEP, 1, 3),
+        (9.2, 0.002, 190.0, DrawClass.LOAD_STEP, 1, 3),
+        (9.3, 0.002, 180.0, DrawClass.LOAD_STEP, 1, 3),
+        (9.5, 0.002, 170.0, DrawClass.EARTH_FAULT, 1, 3),
+        (9.9, 0.002, 150.0, DrawClass.EARTH_FAULT, 1, 4),
+    )
+    closest = Choice(i_set_a=10.0, v_set_pu=0.002, z_set_ohm=100.0, detected=3, margin=1.018)
+    said = refusal_text([case], HEAD, Refusal(obstacle=Obstacle.MARGIN, closest=closest), training)
+    assert "67% of what blocks it are earth faults" in said
+
+
+@pytest.mark.parametrize(
+    ("drawn", "unbalance", "named"),
+    [
+        (DrawClass.ENERGISATION, 0.0, True),
+        (DrawClass.MOTOR_START, 0.0, True),
+        (DrawClass.ENERGISATION, 0.5, False),  # it is on, and does not help
+        (DrawClass.LOAD_SWAP, 0.0, False),
+    ],
+)
+def test_only_what_may_help_in_a_loop_is_named(
+    case: Case, drawn: DrawClass, unbalance: float, named: bool
+) -> None:
+    """What closes inside shows the break's own value in a section of whatever length."""
+    own = looped(case, 0.4, 2.2)
+    detector = replace(own.study.detector, unbalance=unbalance)
+    own = replace(own, study=replace(own.study, detector=detector))
+    closest = Choice(i_set_a=10.0, v_set_pu=0.002, z_set_ohm=1.4, detected=3, margin=0.7)
+    refusal = Refusal(obstacle=Obstacle.WINDOW_MARGIN, closest=closest)
+    said = refusal_text([own], HEAD, refusal, front((20.0, 0.001, 2.0, drawn, 1, 3)))
+    assert f"100% of what blocks it are {drawn.words}" in said
+    assert ("the detector's option unbalance" in said) == named
+    assert "an open loop" in said
+    assert "would" not in said
+    assert "section of" not in said
+    assert "shorter" not in said
+
+
+def test_a_section_that_no_length_would_help_is_not_told_to_be_shorter(case: Case) -> None:
+    """A device whose least Z_set times m2 exceeds the loop: 100 x 1.25 > 2.2 Ω."""
+    device = replace(case.study.device, z_set_ohm=(Steps(first=100.0, last=110.0, step=1.0),))
+    own = looped(case, 0.4, 2.2)
+    own = replace(own, study=replace(own.study, device=device))
+    refusal = Refusal(obstacle=Obstacle.COARSE_DEVICE, closest=None)
+    said = refusal_text([own], HEAD, refusal, NONE)
+    assert "section of at most" not in said
+    assert said.endswith("What may help: a device with a Z_set of 0.8 to 1.44 Ω, or an open loop")
 
 
 def test_an_empty_window_says_what_would_open_it(case: Case) -> None:

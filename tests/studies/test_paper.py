@@ -231,6 +231,20 @@ def test_waves_have_the_phasors_amplitudes_and_step_at_the_event() -> None:
         assert trace.y[trace.x >= 1.0].max() == pytest.approx(after, rel=1e-3)
 
 
+def test_a_legend_says_of_a_curve_what_the_table_says_of_its_value(rows: dict[str, Row]) -> None:
+    panels = paper_panels(load_feeder("paper"))
+    named = [row for row in rows.values() if row.unit == "Ω" and row.basis in ("fit", "variant")]
+    compared = 0
+    for name in ("fig13", "fig14", "fig15"):
+        for trace in panels[name][0].traces:
+            value = np.nanmax(trace.y)
+            same = {row.basis for row in named if abs(row.model) == pytest.approx(value, rel=1e-6)}
+            assert same <= {trace.basis}
+            compared += bool(same)
+    assert {trace.basis for trace in panels["fig14"][0].traces} == {"", "variant"}
+    assert compared >= 5
+
+
 def test_pictures_are_the_same_bytes_each_time() -> None:
     panels = {"fig12": paper_panels(load_feeder("paper"))["fig12"]}
     assert dict(paper_pictures(panels)) == dict(paper_pictures(panels))

@@ -345,7 +345,7 @@ def test_a_loop_without_room_for_z_set_has_no_setting(groups: dict[str, Said]) -
         if "R5" in name:
             assert tied["status"] == "none"
             assert "2 times the section's 1.3 Ω, that is 2.6 Ω" in tied["reason"]
-            assert "What would help: a section of at most 0.9 Ω" in tied["reason"]
+            assert "What may help: a section of at most 0.9 Ω" in tied["reason"]
         elif name in ("R2→R3", "R3→R2") and tied["z_set_ohm"] is not None:
             assert low <= tied["z_set_ohm"] <= high
     missing = [

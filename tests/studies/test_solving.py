@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from oracles.drawn import perfect
 
+from openphase.detector.evidence import Evidence
 from openphase.model import InputError, load_feeder
+from openphase.model.events.base import apply_event, no_event
+from openphase.model.machines import DER_MODELS
+from openphase.model.network import locate
+from openphase.model.parts import DerModel, Feeder
+from openphase.model.solve import steady_state
 from openphase.studies.cli import main
+from openphase.studies.paper.cases import open_phase_a, with_pv
+from openphase.studies.run import engine
+from openphase.studies.run.classes import DrawClass, Purpose
+from openphase.studies.run.draw import BlockId, draw_scenarios, make_case
 from openphase.studies.settings_file import read_settings
 from openphase.studies.solving import parse_break, solve_break
+from openphase.studies.spec.study_file import default_study
 
 V_NOMINAL = 12_000 / 3**0.5
 
@@ -64,6 +77,74 @@ def test_closed_loop() -> None:
     ours = [complex(*terminal(answer, *pair)["z1_ohm"]) for pair in (("R2", "R3"), ("R3", "R2"))]
     assert [f"{abs(z):.4f}" for z in ours] == ["2.4051", "2.4107"]
     assert all(z.real < 0 for z in ours)
+
+
+# --- generation: one way of keeping what it keeps, in solve, the paper's table and the engine ---
+
+
+def pv_of(model: DerModel) -> Feeder:
+    z1_ohm = 12.93j if model in ("thevenin", "generator") else None
+    return with_pv(load_feeder("paper"), model, z1_ohm)
+
+
+def engine_sees(feeder: Feeder) -> Evidence:
+    """What the engine makes of phase a open at 0.6 of R2-R3, loads and source at the file's."""
+    case = make_case(feeder, default_study("paper"))
+    which = BlockId(seed=1, purpose=Purpose.TRAIN, attempt=1, drawn=DrawClass.OPEN_PHASE, block=0)
+    edge, share = locate(case.network, "R2-R3", 0.6)
+    event = replace(
+        no_event(case.network, 1),
+        edge=np.array([edge]), share=np.array([share]), open_after=np.array([1]),
+    )  # fmt: skip
+    steady = steady_state(case.network)
+    before, after = apply_event(case.network, steady, steady, event)
+    drawn = draw_scenarios(case, which, 1)
+    scenario = replace(
+        drawn,
+        before=before,
+        after=after,
+        event=event,
+        der_model=case.network.machines.der_model[:, None],
+        errors=perfect(drawn.errors),
+    )
+    return engine.observe(case, scenario).evidence
+
+
+@pytest.mark.parametrize("model", DER_MODELS)
+def test_generation_keeps_the_same_in_solve_in_the_paper_table_and_in_the_engine(
+    model: DerModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine, "TOLERANCE_PU", 1e-12)
+    feeder = pv_of(model)
+    answer = solve_break(feeder, parse_break("R2-R3:0.6:a", feeder), frozenset())
+    case, seen = open_phase_a(feeder), engine_sees(feeder)
+    for t, row in enumerate(answer["sections"]):
+        assert row["di1_a"] == pytest.approx(case.di_a(row["local"], "1"), rel=1e-6, abs=1e-8)
+        assert row["di1_a"] == pytest.approx(float(seen.di1_a[t, 0]), rel=1e-6, abs=1e-6)
+        if row["z1_ohm"] is not None and row["di1_star_a"] > 0.01:
+            z = complex(*row["z1_ohm"])
+            assert z == pytest.approx(case.z_ohm(row["local"], row["remote"]), rel=1e-5)
+            assert z == pytest.approx(complex(seen.z_ohm[t, 0, 0]), rel=1e-5)
+
+
+def test_an_emf_that_stays_shows_the_paper_s_23_ohm() -> None:
+    feeder = pv_of("thevenin")
+    answer = solve_break(feeder, parse_break("R2-R3:0.6:a", feeder), frozenset())
+    row = terminal(answer, "R2", "R3")
+    z = complex(*row["z1_ohm"])
+    assert (f"{abs(z):.1f}", f"{np.degrees(np.angle(z)):.1f}") == ("23.4", "-94.7")
+    assert f"{row['di1_a']:.2f}" == "2.78"
+
+
+def test_the_models_of_generation_tell_different_things() -> None:
+    """Otherwise the tests above would compare nothing."""
+    shown = []
+    for model in ("thevenin", "constant_current", "constant_power"):
+        feeder = pv_of(model)
+        answer = solve_break(feeder, parse_break("R2-R3:0.6:a", feeder), frozenset())
+        shown.append(complex(*terminal(answer, "R2", "R3")["z1_ohm"]))
+    assert min(abs(x / y - 1) for x in shown for y in shown if x != y) > 0.1
+    assert len(set(shown)) == 3
 
 
 def test_load_side_impedance_is_undefined(radial: dict[str, Any]) -> None:
