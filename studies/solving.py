@@ -32,6 +32,7 @@ Complex = NDArray[np.complex128]
 T = TypeVar("T")
 
 #: without a sheet, every terminal has the paper's settings
+NOTHING_A = 1e-9  #: a change of current below it is rounding, and shows no impedance
 DEFAULTS = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0)
 
 PHASES = "abc"
@@ -244,9 +245,10 @@ def _sections(
     for t, terminal in enumerate(points.terminals):
         seen = only(evidence, t)
         assert seen.di_star_a is not None  # it is shown, and so was asked for
+        undefined = seen.undefined[0, :, 0] | (seen.di_a[0, :, 0] < NOTHING_A)
         impedances = [
-            None if undefined else _pair(z)
-            for z, undefined in zip(seen.z_ohm[0, :, 0], seen.undefined[0, :, 0], strict=True)
+            None if none else _pair(z)
+            for z, none in zip(seen.z_ohm[0, :, 0], undefined, strict=True)
         ]
         trip, reason = _judged(seen, settings.get((terminal.local, terminal.remote)))
         rows.append(

@@ -80,7 +80,7 @@ def _false_trips(
     case: Case, row: dict[str, Any], must_not: list[dict[str, Any]], front: Front, attempt: int
 ) -> str:
     """The worst class with its count and worst scenario, and how many others tripped."""
-    worst = max(must_not, key=lambda own: own["trips"] / own["trials"])
+    worst = max(must_not, key=lambda own: own["trips"] / max(own["trials"], 1))
     others = sum(own["trips"] > 0 for own in must_not) - 1
     more = f", and some in {_counted(others, 'other class', 'es')}" if others else ""
     of_worst = front.scenario[:, 0] == DRAWN_OF[worst["name"]]

@@ -99,7 +99,7 @@ def _missed_share(row: Row) -> float:
 
 
 def _rate(own: Row) -> float:
-    return float(own["trips"]) / float(own["trials"])
+    return float(own["trips"]) / max(float(own["trials"]), 1.0)
 
 
 # ---- class by class ----
@@ -252,7 +252,7 @@ def _matrix_rows(
 def _shaded(own: Row | None, counted: str, rgb: str) -> str:
     if own is None:
         return '<td class="n">–</td>'
-    share = own[counted] / own["trials"]
+    share = own[counted] / max(own["trials"], 1)
     # the square root parts one in a thousand from none
     shade = f' style="background: rgba({rgb}, {0.75 * share**0.5:.2f})"' if share else ""
     return f'<td class="n"{shade}>{k_of_n(own[counted], own["trials"])}</td>'

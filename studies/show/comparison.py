@@ -115,7 +115,7 @@ def _classes(named: Named) -> str:
     ]
     if not bad:
         return ""
-    bad.sort(key=lambda own: -(own["both"] + own["only_a"] + own["only_b"]) / own["trials"])
+    bad.sort(key=lambda own: -(own["both"] + own["only_a"] + own["only_b"]) / max(own["trials"], 1))
     said = [f"{_of_class(own)} of {own['trials']} {class_words(own)}" for own in bad[:MOST_CLASSES]]
     more = len(bad) - MOST_CLASSES
     return f"{name}: {'; '.join(said)}{f'; and {more} more classes' if more > 0 else ''}"

@@ -172,7 +172,7 @@ def class_words(own: dict[str, Any]) -> str:
 def _false_trips(row: dict[str, Any]) -> str:
     """The classes in which a setting trips falsely, the highest rate first."""
     bad = [own for own in row["classes"] if own["kind"] == "must_not_trip" and own["trips"]]
-    bad.sort(key=lambda own: -own["trips"] / own["trials"])
+    bad.sort(key=lambda own: -own["trips"] / max(own["trials"], 1))
     said = [f"{own['trips']} of {own['trials']} {class_words(own)}" for own in bad[:MOST_CLASSES]]
     more = len(bad) - MOST_CLASSES
     return ", ".join([*said, f"and {more} more classes"] if more > 0 else said)

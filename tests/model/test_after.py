@@ -58,10 +58,9 @@ def test_what_stays_within_its_voltage_is_carried_over(model: DerModel) -> None:
     np.testing.assert_allclose(answer.v, plain.v, atol=1e-6)
 
 
-@pytest.mark.parametrize("model", ["constant_current", "constant_power"])
-def test_der_trip_on_overvoltage_in_those_scenarios_alone(model: DerModel) -> None:
-    """At a quarter of the load two open phases cannot take what the DER delivers."""
-    network = network_with(model, 700.0)
+def test_der_trip_on_overvoltage_in_those_scenarios_alone() -> None:
+    """At a quarter of the load two open phases cannot take the current that the DER keeps."""
+    network = network_with("constant_current", 700.0)
     before, known, after = states(network, [0, 3, 6], level=0.25)
     factor = np.ones((1, 3))
     plain = solve(network, carried_over(network, before, known, after, factor))
