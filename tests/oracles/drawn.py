@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from oracles.dense import DenseSolution, NotConvergedError, solve_dense
+from oracles.dense_parts import KV_LV
 from oracles.random_happenings import dense_event
 
 from openphase.detector.instruments import Errors, Wiring
@@ -78,9 +79,7 @@ def frames_of(case: Case, scenarios: Scenarios, s: int) -> Frames:
         happening = dense_event(case.network, event, detached, after=after)
         try:
             found = solve(happening)
-            trips = after and any(
-                found.load_pu[_watch(d).name].max() > MOST_PU for d in feeder.ders
-            )
+            trips = after and any(_stands_pu(feeder, found, d) > MOST_PU for d in feeder.ders)
         except NotConvergedError:
             if not (after and feeder.ders):
                 raise
@@ -90,6 +89,21 @@ def frames_of(case: Case, scenarios: Scenarios, s: int) -> Frames:
         solved.append(found)
         opened_in.append(opened)
     return _measured(feeder, solved, opened_in)
+
+
+def _stands_pu(feeder: Feeder, found: DenseSolution, der: Der) -> float:
+    """What a DER sees: its highest phase; without a neutral the positive sequence."""
+    if feeder.source.wires == 4:
+        return float(found.load_pu[_watch(der).name].max())
+    if der.transformer is not None:
+        v, nominal = found.lv[der.transformer], KV_LV * 1000.0 / np.sqrt(3.0)
+    else:
+        assert der.place is not None
+        lines = {line.name: line.to_bus for line in feeder.lines}
+        bus = der.place.bus or lines[str(der.place.line)]  # a tee is as high as the line's end
+        v, nominal = found.v[bus], feeder.source.v_phase_v
+    turn = np.exp(2j * np.pi / 3.0)
+    return float(abs(v @ np.array([1.0, turn, turn**2])) / 3.0 / nominal)
 
 
 def reported(frames: Frames, points: tuple[int, int], wrong: tuple[int, int]) -> Ends:

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from openphase.model.distributions import Uniform
 from openphase.studies import assessing, cli, sizing
 from openphase.studies.run.classes import DrawClass
+from openphase.studies.spec.events import LoadSwapDraw
 from openphase.studies.spec.parts import Group
 from openphase.studies.spec.study_file import Study, default_study, dump_study
 
@@ -197,17 +199,43 @@ def test_it_spends_no_attempt_and_has_the_number_size_has(copy: Path) -> None:
     before = book.read_bytes()
     assert assess(copy, "reference", "one").result["attempt"] == 1
     assert book.read_bytes() == before
-    # of another seed: the number that size would get, and gets
+    # of another seed: the number that size would get, and gets; it is taken from others
     assert assess(copy, "reference", "two", seed=2).result["attempt"] == 2
-    assert assess(copy, "reference", "three", seed=3).result["attempt"] == 2
-    assert book.read_bytes() == before
+    assert assess(copy, "reference", "three", seed=3).result["attempt"] == 3
     assert size(copy, "two-sized", seed=2).result["attempt"] == 2
 
 
-def test_nothing_is_written_beside_the_run_folder(tmp_path: Path) -> None:
+def test_only_the_ledger_is_written_beside_the_run_folder(tmp_path: Path) -> None:
     write_study(tmp_path / "study.toml", study_of())
     assert assess(tmp_path, "reference").code == 3
-    assert {path.name for path in tmp_path.iterdir()} == {"study.toml", "assessed"}
+    assert {path.name for path in tmp_path.iterdir()} == {"study.toml", "assessed", "ledger.json"}
+
+
+def test_another_study_of_the_feeder_gets_fresh_draws(copy: Path) -> None:
+    """Whatever it changes: whoever has looked at a sample cannot have it again."""
+    study = study_of()
+    eased = replace(study.events, load_swap=LoadSwapDraw(ratio=Uniform(low=-0.9, high=-0.8)))
+    write_study(copy / "study.toml", replace(study, events=eased))
+    assert assess(copy, "reference", "eased").result["attempt"] == 2
+
+
+def test_the_second_sheet_on_the_same_draws_is_certified_by_nothing(
+    copy: Path, tmp_path: Path
+) -> None:
+    sheets = []
+    for n, i_set_a in enumerate((5.0, 6.0)):
+        path = tmp_path / f"sheet{n}.csv"
+        path.write_text(
+            f"local,remote,i_set_a,v_set_pu,z_set_ohm\nR2,R3,{i_set_a},0.05,20\n", encoding="utf-8"
+        )
+        sheets.append(str(path))
+    first, second = (assess(copy, sheet, f"sheet{n}") for n, sheet in enumerate(sheets))
+    assert first.result["assessed"]["sheets_before"] == 0
+    assert second.result["assessed"]["sheets_before"] == 1
+    assert "other sheet" in second.result["assessed"]["note"]
+    assert not {row["status"] for row in second.result["sections"]} & {"set", "weak"}
+    again = assess(copy, sheets[0], "again")
+    assert again.result["assessed"]["sheets_before"] == 0
 
 
 # --- where a sheet comes from ------------------------------------------------------------

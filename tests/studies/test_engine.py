@@ -366,8 +366,10 @@ def test_judged_blocks_count_what_the_verdicts_say(kind: str, drawn: DrawClass) 
                 close = np.zeros(SIZE, np.bool_)
                 for k in rows:
                     moved = known.evidence.di_a[t, k] > one.i_set_a / 2.0
+                    if k:  # phases stand in below the threshold only
+                        moved &= known.evidence.di_a[t, 0] < one.i_set_a
                     close |= moved & (known.evidence.dv_pu[t, k] <= one.v_set_pu)
-                near = int((close & members).sum())
+                near = int((close & members & ~known.evidence.blocked[t]).sum())
             assert tested.effective[r, t] == near
         everywhere = replace(case, judged=np.ones_like(case.judged))
         bad = must_not_trip(everywhere, drawn, known, t) & trip[0]

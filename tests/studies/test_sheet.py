@@ -217,14 +217,15 @@ def test_the_worst_class_is_named() -> None:
     assert "Here the worst is source steps at R1→R3." in said
 
 
-def test_what_is_told_apart_is_summed_over_terminals() -> None:
+def test_what_is_told_apart_is_listed_by_terminal() -> None:
     result = answer()
     for row in result["sections"][:2]:
         row["classes"] = classes(open_three=999)
     said = " ".join(sheet_table(result).split())
-    assert "told apart, share that trips: breaks on laterals inside 0 % of 4000" in said
-    assert "three-phase breaks inside 50 % of 4000" in said
-    assert "own points: 90 % of 4000 raise the alarm." in said
+    assert "told apart, in neither count: the share that trips" in said
+    assert "R1→R2: breaks on laterals inside 0 % of" in said
+    assert "three-phase breaks inside 99 % of 1000" in said
+    assert "wiring faults of its own points 90 % of 1000" in said
 
 
 def two_groups() -> dict[str, Any]:

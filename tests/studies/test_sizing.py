@@ -246,10 +246,17 @@ def test_exit_code(statuses: tuple[str, ...], code: int) -> None:
     assert session.exit_code({"sections": rows_of("normal", *statuses)}) == code
 
 
-def rows_of(group: str, *statuses: str) -> list[dict[str, str]]:
+def test_settings_that_find_nothing_serve_nobody() -> None:
+    rows = rows_of("normal", "weak", "load_side", "set", "load_side")
+    assert session.exit_code({"sections": rows}) == 0
+    rows[0]["detected"] = 0
+    assert session.exit_code({"sections": rows}) == 3
+
+
+def rows_of(group: str, *statuses: str) -> list[dict[str, Any]]:
     ends = [("A", "B"), ("B", "A"), ("B", "C"), ("C", "B")]
     return [
-        {"local": a, "remote": b, "setting_group": group, "status": status}
+        {"local": a, "remote": b, "setting_group": group, "status": status, "detected": 7}
         for (a, b), status in zip(ends, statuses, strict=True)
     ]
 
