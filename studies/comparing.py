@@ -20,6 +20,19 @@ from .show.comparison import comparison_text
 
 __all__ = ["compare_command", "compare_runs"]
 
+#: what a comparison repeats of a row: all that decides what its terminal says, and its result
+OF_A_SETTING = (
+    "status",
+    "i_set_a",
+    "v_set_pu",
+    "z_set_ohm",
+    "dt_ms",
+    "negative_sign",
+    "options",
+    "detected",
+    "false_trips",
+)
+
 NO_SETTING = "no_setting"  #: why a terminal that has none misses every break
 
 
@@ -53,7 +66,8 @@ def compare_runs(paths: Sequence[Path]) -> dict[str, Any]:
     if faults:
         raise InputError(faults)
     first = runs[0]
-    alpha = (1.0 - first.result["confidence"]) / max(_judged(first), 1)
+    with_interval = _rows_with_a_setting(runs)
+    alpha = (1.0 - first.result["confidence"]) / max(len(with_interval) * (len(runs) - 1), 1)
     return {
         "version": first.result["version"],
         "feeder": first.result["feeder"],
@@ -62,13 +76,21 @@ def compare_runs(paths: Sequence[Path]) -> dict[str, Any]:
         "scenarios": first.result["scenarios"],
         "confidence": first.result["confidence"],
         "runs": [_described(run) for run in runs],
-        "comparisons": [_comparison(first, n, other, alpha) for n, other in enumerate(runs[1:], 1)],
+        "comparisons": [
+            {"a": 0, "b": n, "sections": _sections(first, other, with_interval, alpha)}
+            for n, other in enumerate(runs[1:], 1)
+        ],
     }
 
 
-def _judged(run: Run) -> int:
-    """Terminals and groups whose intervals are to hold together."""
-    return sum(row["status"] != "load_side" for row in run.result["sections"])
+def _rows_with_a_setting(runs: Sequence[Run]) -> frozenset[int]:
+    """Rows in which any run has a setting, load-side ones too: each has an interval.
+
+    They are known before an event is looked at, and the same in whatever order the runs come.
+    """
+    return frozenset(
+        k for run in runs for k, row in enumerate(run.result["sections"]) if row["i_set_a"]
+    )
 
 
 def _described(run: Run) -> dict[str, Any]:
@@ -80,25 +102,26 @@ def _described(run: Run) -> dict[str, Any]:
     }
 
 
-def _comparison(a: Run, n: int, b: Run, alpha: float) -> dict[str, Any]:
-    pairs = pair_runs(a, b)
-    rows = zip(a.result["sections"], b.result["sections"], strict=True)
-    return {
-        "a": 0,
-        "b": n,
-        "sections": [_section(own, other, pairs[k], alpha) for k, (own, other) in enumerate(rows)],
-    }
+def _sections(a: Run, b: Run, with_interval: frozenset[int], alpha: float) -> list[dict[str, Any]]:
+    """A row for every terminal and group; each interval misses with probability ``alpha``."""
+    rows = zip(a.result["sections"], b.result["sections"], pair_runs(a, b), strict=True)
+    return [
+        _section(own, other, pairs, alpha if k in with_interval else None)
+        for k, (own, other, pairs) in enumerate(rows)
+    ]
 
 
-def _section(a: dict[str, Any], b: dict[str, Any], pairs: Pairs, alpha: float) -> dict[str, Any]:
-    """What two runs say of one terminal in one group."""
+def _section(
+    a: dict[str, Any], b: dict[str, Any], pairs: Pairs, alpha: float | None
+) -> dict[str, Any]:
+    """What two runs say of one terminal in one group; no interval where ``alpha`` is None."""
     classes = [_class(r, pairs) for r in range(len(REPORTED)) if pairs.classes[r].any()]
     must_not = [own for own in classes if own["kind"] == "must_not_trip"]
     trip = np.arange(len(pairs.breaks)) == Reason.TRIP
     both, only_a = (int(pairs.breaks[trip][:, own].sum()) for own in (trip, ~trip))
     only_b, neither = (int(pairs.breaks[~trip][:, own].sum()) for own in (trip, ~trip))
     n = both + only_a + only_b + neither
-    low, high = paired_difference(only_b, only_a, n, alpha)
+    interval = (None, None) if alpha is None else paired_difference(only_b, only_a, n, alpha)
     return {
         "local": a["local"],
         "remote": a["remote"],
@@ -111,8 +134,8 @@ def _section(a: dict[str, Any], b: dict[str, Any], pairs: Pairs, alpha: float) -
         "only_b": only_b,
         "neither": neither,
         "difference": (only_b - only_a) / n if n else None,
-        "difference_low": low if n else None,
-        "difference_high": high if n else None,
+        "difference_low": interval[0] if n else None,
+        "difference_high": interval[1] if n else None,
         "security_trials": sum(own["trials"] for own in must_not),
         "false_trips": {
             key: sum(own[key] for own in must_not) for key in ("both", "only_a", "only_b")
@@ -124,8 +147,7 @@ def _section(a: dict[str, Any], b: dict[str, Any], pairs: Pairs, alpha: float) -
 
 
 def _setting(row: dict[str, Any]) -> dict[str, Any]:
-    keys = ("status", "i_set_a", "v_set_pu", "z_set_ohm", "detected", "false_trips")
-    return {key: row[key] for key in keys}
+    return {key: row[key] for key in OF_A_SETTING}
 
 
 def _class(r: int, pairs: Pairs) -> dict[str, Any]:

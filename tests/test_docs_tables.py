@@ -32,7 +32,7 @@ format = 1
 [events]
 without = [
     "open_three", "capacitor_step", "motor_start", "earth_fault", "line_fault", "energisation",
-    "reclosing", "single_pole", "fallen_source_side", "fallen_load_side", "open_with_load_step",
+    "reclosing", "single_pole", "fallen_source_side", "open_with_load_step",
     "load_swap", "step_with_tap",
 ]
 [detector]
@@ -139,6 +139,7 @@ DOCUMENTED = [
     ("`assessed.run_beside`", RUNS, "assessed.run_beside"),
     ("`sections`", RUNS, "sections"),
     ("`sections.classes`", RUNS, "sections.classes"),
+    ("`sections.classes.by_ohm`", RUNS, "sections.classes.by_ohm"),
     ("`sections.causes`", RUNS, "sections.causes"),
     ("`sections.nearest_false_trip`", RUNS, "sections.nearest_false_trip"),
     ("`compared`", RUNS, "compared"),

@@ -6,11 +6,13 @@ import math
 from typing import Any
 
 from ...detector.criteria import Reason
+from ..spec.parts import DetectorOptions
 from .sheet import Row, class_words, row_name, setting_text, table_lines, wrapped
 
 __all__ = ["comparison_text"]
 
-MOST_CLASSES = 6  #: classes listed per terminal; all are in the JSON
+MOST_ROWS = 40  #: classes and terminals with false trips that are listed; all are in the JSON
+DEFAULT = DetectorOptions()
 
 
 def comparison_text(result: dict[str, Any]) -> str:
@@ -40,12 +42,8 @@ def _comparison(own: dict[str, Any], runs: list[dict[str, Any]]) -> list[str]:
     ]
     if not rows:
         return [*lines, "", "neither run has a setting anywhere"]
+    lines += ["", *_setting_lines(rows)]
     tables = (
-        (
-            ("terminal", "run"),
-            ("I_set A", "V_set %", "Z_set Ω", "status", "found", "false trips"),
-            [_setting_row(named, letter) for named in rows for letter in "ab"],
-        ),
         (
             ("breaks found by",),
             ("both", "only A", "only B", "neither", "B - A", "interval"),
@@ -57,20 +55,47 @@ def _comparison(own: dict[str, Any], runs: list[dict[str, Any]]) -> list[str]:
             [_false_row(named) for named in rows],
         ),
     )
-    for table in tables:
-        lines += ["", *table_lines(*table)]
-    for title, texts in (
-        ("false trips by class", map(_classes, rows)),
-        ("breaks gained and lost, by what the other run misses them for", map(_causes, rows)),
-    ):
-        said = [line for text in texts if text for line in wrapped(f"  {text}")]
-        if said:
-            lines += ["", title, *said]
+    for heads_and_rows in tables:
+        lines += ["", *table_lines(*heads_and_rows)]
+    lines += _class_lines(rows)
+    said = [line for text in map(_causes, rows) if text for line in wrapped(f"  {text}")]
+    if said:
+        lines += ["", "breaks gained and lost, by what the other run misses them for", *said]
     return lines
 
 
 def _run(run: dict[str, Any]) -> str:
     return f"{run['run']} ({run['verb']}, settings {run['settings']})"
+
+
+def _setting_lines(rows: list[Named]) -> list[str]:
+    """The settings of both runs; options that are not the defaults as notes by number."""
+    own = [(named, letter) for named in rows for letter in "ab"]
+    texts = [_options(named[1][letter]) for named, letter in own]
+    notes = {text: n for n, text in enumerate(dict.fromkeys(filter(None, texts)), 1)}
+    heads: tuple[str, ...] = ("I_set A", "V_set %", "Z_set Ω", "status", "found", "false trips")
+    cells = [_setting_row(named, letter) for named, letter in own]
+    if notes:
+        heads = (*heads, "options")
+        marks = [f"({notes[text]})" if text else "default" for text in texts]
+        cells = [
+            (keys, values if isinstance(values, str) else (*values, mark))
+            for (keys, values), mark in zip(cells, marks, strict=True)
+        ]
+    lines = table_lines(("terminal", "run"), heads, cells)
+    return lines + [line for text, n in notes.items() for line in wrapped(f"options ({n}): {text}")]
+
+
+def _options(own: dict[str, Any]) -> str:
+    """All that a setting says beside its three numbers, where it is not the default."""
+    if own["i_set_a"] is None:
+        return ""
+    said = [own["options"]] if own["options"] else []
+    if own["negative_sign"] != DEFAULT.negative_sign:
+        said.append(f"negative_sign={str(own['negative_sign']).lower()}")
+    if own["dt_ms"] != DEFAULT.dt_ms:
+        said.append(f"dt_ms={setting_text(own['dt_ms'])}")
+    return "; ".join(said)
 
 
 def _setting_row(named: Named, letter: str) -> Row:
@@ -92,7 +117,7 @@ def _setting_row(named: Named, letter: str) -> Row:
 def _found_row(named: Named) -> Row:
     name, row = named
     counts = [str(row[key]) for key in ("both", "only_a", "only_b", "neither")]
-    if row["difference"] is None:
+    if row["difference_low"] is None:
         return (name,), (*counts, "–", "–")
     low, high = row["difference_low"], row["difference_high"]
     interval = f"{math.floor(low * 1000) / 1000:+.3f}..{math.ceil(high * 1000) / 1000:+.3f}"
@@ -105,26 +130,35 @@ def _false_row(named: Named) -> Row:
     return (name,), (*map(str, counts), str(row["security_trials"]))
 
 
-def _classes(named: Named) -> str:
-    """The classes that must not trip and in which one run at least did, the worst first."""
-    name, row = named
+def _class_lines(rows: list[Named]) -> list[str]:
+    """Where one run at least trips falsely: class by class and terminal, the worst rate first."""
     bad = [
-        own
+        (name, own)
+        for name, row in rows
         for own in row["classes"]
-        if own["kind"] == "must_not_trip" and (own["both"] or own["only_a"] or own["only_b"])
+        if own["kind"] == "must_not_trip" and _tripped(own)
     ]
     if not bad:
-        return ""
-    bad.sort(key=lambda own: -(own["both"] + own["only_a"] + own["only_b"]) / max(own["trials"], 1))
-    said = [f"{_of_class(own)} of {own['trials']} {class_words(own)}" for own in bad[:MOST_CLASSES]]
-    more = len(bad) - MOST_CLASSES
-    return f"{name}: {'; '.join(said)}{f'; and {more} more classes' if more > 0 else ''}"
+        return []
+    bad.sort(key=lambda named: -_tripped(named[1]) / named[1]["trials"])
+    table = table_lines(
+        ("false trips by class", "terminal"),
+        ("both", "only A", "only B", "events"),
+        [_class_row(named) for named in bad[:MOST_ROWS]],
+    )
+    more = len(bad) - MOST_ROWS
+    return ["", *table, *([f"and {more} more rows, which --json lists"] if more > 0 else [])]
 
 
-def _of_class(own: dict[str, Any]) -> str:
-    """Who trips how often; what is zero is left out."""
-    words = {"both": "both", "only_a": "only A", "only_b": "only B"}
-    return ", ".join(f"{own[key]} {name}" for key, name in words.items() if own[key])
+def _class_row(named: Named) -> Row:
+    name, own = named
+    keys = ("both", "only_a", "only_b", "trials")
+    return (class_words(own), name), [str(own[key]) for key in keys]
+
+
+def _tripped(own: dict[str, Any]) -> int:
+    """Events of a class in which one run at least tripped."""
+    return int(own["both"] + own["only_a"] + own["only_b"])
 
 
 def _causes(named: Named) -> str:

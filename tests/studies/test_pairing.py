@@ -177,15 +177,17 @@ def test_rows_agree_with_the_runs_own_results(home: Path, compared: dict[str, An
 
 
 def test_differences_have_intervals_and_causes(compared: dict[str, Any]) -> None:
-    judged = sum(
-        row["a"]["status"] != "load_side" for row in compared["comparisons"][0]["sections"]
-    )
-    assert judged == 12
+    # R1→R2, R2→R3, R3→R4 and R5→R4b have a setting in one run at least, in each group
+    intervals = 8
     for row in compared["comparisons"][0]["sections"]:
-        n, alpha = row["reachable"], 0.05 / judged
+        n, alpha = row["reachable"], 0.05 / intervals
         assert row["difference"] == (row["only_b"] - row["only_a"]) / n
-        interval = paired_difference(row["only_b"], row["only_a"], n, alpha)
-        assert (row["difference_low"], row["difference_high"]) == pytest.approx(interval)
+        own = row["difference_low"], row["difference_high"]
+        if row["a"]["i_set_a"] or row["b"]["i_set_a"]:
+            assert own == pytest.approx(paired_difference(row["only_b"], row["only_a"], n, alpha))
+        else:
+            assert own == (None, None)
+            assert row["difference"] == 0.0
         assert sum(cause["breaks"] for cause in row["gained"]) == row["only_b"]
         assert sum(cause["breaks"] for cause in row["lost"]) == row["only_a"]
     by_name = {
@@ -194,6 +196,52 @@ def test_differences_have_intervals_and_causes(compared: dict[str, Any]) -> None
     # A has nothing at R3 and B nothing at R5
     assert [c["criterion"] for c in by_name["R3", "normal"]["gained"]] == ["no_setting"]
     assert [c["criterion"] for c in by_name["R5", "normal"]["lost"]] == ["no_setting"]
+
+
+def test_all_intervals_of_all_comparisons_share_the_error_probability(home: Path) -> None:
+    """Load-side rows with a setting too: 8 rows, in each of two comparisons."""
+    result = compare_runs([home / "a", home / "b", home / "b"])
+    given = [
+        row
+        for own in result["comparisons"]
+        for row in own["sections"]
+        if row["difference_low"] is not None
+    ]
+    assert len(given) == 16
+    for row in given:
+        expected = paired_difference(row["only_b"], row["only_a"], row["reachable"], 0.05 / 16)
+        assert (row["difference_low"], row["difference_high"]) == pytest.approx(expected)
+
+
+def test_a_load_side_row_with_a_setting_has_its_share(home: Path, tmp_path: Path) -> None:
+    """The row counts whichever run has the setting, and in whatever order they come."""
+    feeder, path = load_feeder("paper"), tmp_path / "c.csv"
+    path.write_text("local,remote,i_set_a,v_set_pu,z_set_ohm\nR3,R2,1,0.05,5\n", encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(assessing, "write_report", lambda *_: None)
+        demand = Demand(scenarios=N, jobs=1)
+        sheet = read_sheet(path, feeder)
+        # beside the others, so that the ledger is the same
+        assessing.assess_feeder(feeder, small_study(), sheet, demand, home / "c")
+    here = {}
+    for order in (("a", "c"), ("c", "a")):
+        result = compare_runs([home / name for name in order])
+        for row in result["comparisons"][0]["sections"]:
+            if row["difference_low"] is None:
+                continue
+            expected = paired_difference(row["only_b"], row["only_a"], row["reachable"], 0.05 / 8)
+            assert (row["difference_low"], row["difference_high"]) == pytest.approx(expected)
+            key = row["local"], row["remote"], row["setting_group"]
+            here.setdefault(key, []).append(row["difference_high"] - row["difference_low"])
+    assert here.keys() >= {("R3", "R2", "normal"), ("R3", "R2", "tied")}
+    assert len(here) == 8
+    assert all(widths[0] == pytest.approx(widths[1]) for widths in here.values())
+
+
+def test_options_that_decide_are_told(compared: dict[str, Any]) -> None:
+    for row in compared["comparisons"][0]["sections"]:
+        for own in (row["a"], row["b"]):
+            assert (own["options"], own["negative_sign"], own["dt_ms"]) == ("", True, 800.0)
 
 
 def test_exchanged_runs_give_exchanged_answers(home: Path, compared: dict[str, Any]) -> None:
@@ -205,7 +253,10 @@ def test_exchanged_runs_give_exchanged_answers(home: Path, compared: dict[str, A
         assert (row["only_a"], row["only_b"]) == (mirrored["only_b"], mirrored["only_a"])
         assert row["difference"] == -mirrored["difference"]
         assert row["gained"] == mirrored["lost"]
-        assert row["difference_low"] == pytest.approx(-mirrored["difference_high"])
+        if row["difference_low"] is None:
+            assert mirrored["difference_high"] is None
+        else:
+            assert row["difference_low"] == pytest.approx(-mirrored["difference_high"])
 
 
 def test_a_run_beside_itself_differs_in_nothing(home: Path) -> None:
