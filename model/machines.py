@@ -128,7 +128,7 @@ def machine_state(
     follows[:motors] = exponent[load]
     y = np.zeros((own.count, 3, size), np.complex128)
     y[:motors, 2] = y2_y1 * va[:motors].conj() / (3.0 * v * v)
-    connected = level != 0.0
+    connected = va[motors:] != 0.0
     y[motors:, 0] = np.where(connected, own.der_y_s[:, 0, None], 0.0)
     y[motors:, 2] = np.where(connected, own.der_y_s[:, 2, None], 0.0)
     static = load_scale.copy()

@@ -23,9 +23,15 @@ from .run.cases import Case, make_cases
 from .run.certify import Given, Rival, Validation, certified, sheets_of
 from .run.choose import reference_settings
 from .run.classes import Purpose
-from .run.digests import digest, feeder_digest, manifest, population_digest
+from .run.digests import (
+    digest,
+    feeder_digest,
+    manifest,
+    population_digest,
+    settings_digest,
+)
 from .run.engine import options_of
-from .run.ledger import Attempt, find_attempt, reserve, sheets_before
+from .run.ledger import LEDGER, Attempt, find_attempt, reserve, sheets_before
 from .run.options import options_text
 from .run.session import (
     Demand,
@@ -63,8 +69,6 @@ AFTER_OTHERS = (
     "these very draws have judged {others} other sheet(s) before: where their results guided this "
     "one, it was chosen on this sample and its bounds do not hold; another --seed draws a fresh one"
 )
-
-LEDGER = "ledger.json"
 
 LEFT_OUT = "the sheet leaves this terminal without a setting"
 
@@ -187,7 +191,7 @@ def _begin(
     folder = RunFolder(out)
     command = ("assess", feeder.name, "--settings", "settings.csv", "--study", "study.toml")
     made_from = manifest(command, feeder, study, attempt)
-    made_from["settings_sha256"] = _digest_of(given)
+    made_from["settings_sha256"] = settings_digest(given)
     announce(cases, folder, made_from, attempt, demand, (Purpose.VALIDATE,))
     if reserve(book, *entry) != attempt:
         raise OpenPhaseError(f"{book}: another run took the attempt meanwhile; start again")
@@ -213,10 +217,6 @@ def _given(case: Case, t: int, own: Settings | None) -> Given:
     return Given(settings=own, note=loop_note(case, t, own.z_set_ohm))
 
 
-def _digest_of(given: tuple[tuple[Settings | None, ...], ...]) -> str:
-    return digest(*(repr(own) for group in given for own in group))
-
-
 # ---- where the sheet comes from ----
 
 
@@ -231,7 +231,7 @@ def _assessed(
 
     ``drawn`` is what tells the draws from others: population, seed and attempt.
     """
-    sha = _digest_of(given)
+    sha = settings_digest(given)
     origin = None if sheet is None else _origin(Path(sheet.source).parent, sheet, drawn)
     sized = origin is not None and origin["same_draws"] and not origin["edited"]
     others = 0
@@ -255,7 +255,7 @@ def _demote(rows: list[dict[str, Any]], note: str) -> None:
     """Settings that may have been chosen on these draws are certified by nothing."""
     for row in rows:
         if row["status"] in ("set", "weak"):
-            row["status"], row["reason"] = "not_certified", note
+            row["status"], row["reason"] = "not_certified", f"{note}; {row['reason']}"
 
 
 def _origin(

@@ -38,7 +38,7 @@ exit codes:
   0  answered
   1  could not be done
   2  the input is at fault
-  3  answered, but some section has no settings, or a certificate failed"""
+  3  answered, but some section has no settings that find anything, or no certificate"""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -16,9 +16,9 @@ from .run.cases import Case, make_cases
 from .run.certify import Given, Rival, Validation, certified, sheets_of
 from .run.choose import Chosen, Training, as_settings, choices, gather, reference_settings
 from .run.classes import Purpose
-from .run.digests import digest, feeder_digest, manifest
+from .run.digests import digest, feeder_digest, manifest, settings_digest
 from .run.draw import BlockId
-from .run.ledger import Attempt, find_attempt, reserve
+from .run.ledger import LEDGER, Attempt, find_attempt, reserve, sheets_before
 from .run.session import (
     Demand,
     Watch,
@@ -87,6 +87,9 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     rivals = [
         [_rivals(case, own) for own in group] for case, group in zip(cases, chosen, strict=True)
     ]
+    # no other sheet is certified by these draws, but a fresh one
+    sheet = settings_digest([[own[0].settings for own in group] for group in rivals])
+    sheets_before(out.resolve().parent / LEDGER, attempt, sheet)
     given = [[_given(study, t, own, attempt) for t, own in enumerate(group)] for group in chosen]
     validations = validate(cases, rivals, attempt, folder, demand.jobs)
     watch.lap("validate_s")
@@ -106,7 +109,7 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
 def _begin(cases: Sequence[Case], demand: Demand, out: Path) -> tuple[RunFolder, Attempt]:
     """Announce the run, take its attempt, and make the folder its own."""
     feeder, study = cases[0].feeder, cases[0].study
-    book = out.resolve().parent / "ledger.json"
+    book = out.resolve().parent / LEDGER
     entry = (
         feeder_digest(feeder),
         digest(dump_study(study)),

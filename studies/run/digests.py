@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from importlib import metadata, resources
 from typing import Any
 
 from ... import __version__
+from ...detector.criteria import Settings
 from ...model.parts import Feeder, Section
 from ...model.reading.feeder_file import feeder_content
 from ..spec.study_file import Study, dump_population, dump_study, resolved
 from .engine import BLOCK
 from .ledger import Attempt
 
-__all__ = ["code_digest", "digest", "feeder_digest", "manifest", "population_digest"]
+__all__ = [
+    "code_digest",
+    "digest",
+    "feeder_digest",
+    "manifest",
+    "population_digest",
+    "settings_digest",
+]
 
 LIBRARIES = ("numpy", "scipy", "numba")
 
@@ -45,6 +54,11 @@ def population_digest(feeder: Feeder, study: Study) -> str:
     """SHA-256 of what decides which scenarios there are, however it is written or called."""
     own = resolved(study, feeder)
     return digest(feeder_content(replace(feeder, name="any")), dump_population(own))
+
+
+def settings_digest(given: Sequence[Sequence[Settings | None]]) -> str:
+    """SHA-256 of a sheet: its settings by group and terminal."""
+    return digest(*(repr(own) for group in given for own in group))
 
 
 def code_digest() -> str:

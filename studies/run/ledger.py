@@ -19,7 +19,9 @@ from pathlib import Path
 from ...model.errors import OpenPhaseError
 from .store import as_json, write_whole
 
-__all__ = ["Attempt", "find_attempt", "reserve", "sheets_before"]
+__all__ = ["LEDGER", "Attempt", "find_attempt", "reserve", "sheets_before"]
+
+LEDGER = "ledger.json"  #: beside the run folders
 
 LOCK_TRIES, LOCK_WAIT_S = 100, 0.1
 

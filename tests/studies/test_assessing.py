@@ -229,13 +229,15 @@ def test_the_second_sheet_on_the_same_draws_is_certified_by_nothing(
             f"local,remote,i_set_a,v_set_pu,z_set_ohm\nR2,R3,{i_set_a},0.05,20\n", encoding="utf-8"
         )
         sheets.append(str(path))
-    first, second = (assess(copy, sheet, f"sheet{n}") for n, sheet in enumerate(sheets))
+    first, second = (assess(copy, sheet, f"sheet{n}", seed=2) for n, sheet in enumerate(sheets))
     assert first.result["assessed"]["sheets_before"] == 0
     assert second.result["assessed"]["sheets_before"] == 1
     assert "other sheet" in second.result["assessed"]["note"]
     assert not {row["status"] for row in second.result["sections"]} & {"set", "weak"}
-    again = assess(copy, sheets[0], "again")
+    again = assess(copy, sheets[0], "again", seed=2)
     assert again.result["assessed"]["sheets_before"] == 0
+    # the draws that size judged its own sheet by have judged one
+    assert assess(copy, sheets[0], "sized").result["assessed"]["sheets_before"] == 1
 
 
 # --- where a sheet comes from ------------------------------------------------------------
