@@ -237,7 +237,7 @@ def test_the_second_sheet_on_the_same_draws_is_certified_by_nothing(
     again = assess(copy, sheets[0], "again", seed=2)
     assert again.result["assessed"]["sheets_before"] == 0
     # the draws that size judged its own sheet by have judged one
-    assert assess(copy, sheets[0], "sized").result["assessed"]["sheets_before"] == 1
+    assert assess(copy, sheets[0], "after-size").result["assessed"]["sheets_before"] == 1
 
 
 # --- where a sheet comes from ------------------------------------------------------------
