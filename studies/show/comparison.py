@@ -57,7 +57,7 @@ def _comparison(own: dict[str, Any], runs: list[dict[str, Any]]) -> list[str]:
     )
     for heads_and_rows in tables:
         lines += ["", *table_lines(*heads_and_rows)]
-    lines += _class_lines(rows)
+    lines += _open_lines(rows) + _class_lines(rows)
     said = [line for text in map(_causes, rows) if text for line in wrapped(f"  {text}")]
     if said:
         lines += ["", "breaks gained and lost, by what the other run misses them for", *said]
@@ -148,6 +148,26 @@ def _class_lines(rows: list[Named]) -> list[str]:
     )
     more = len(bad) - MOST_ROWS
     return ["", *table, *([f"and {more} more rows, which --json lists"] if more > 0 else [])]
+
+
+def _open_lines(rows: list[Named]) -> list[str]:
+    """Which open phases inside were gained and lost, those in disguise among them."""
+    seen = [
+        (name, own)
+        for name, row in rows
+        for own in row["classes"]
+        if own["kind"] != "must_not_trip"
+        and own["side"] == "inside"
+        and own["name"] != "wiring"
+        and (own["only_a"] or own["only_b"])
+        and any(row[letter]["i_set_a"] is not None for letter in "ab")
+    ]
+    if not seen:
+        return []
+    keys = ("both", "only_a", "only_b", "trials")
+    cells = [((class_words(own), name), [str(own[key]) for key in keys]) for name, own in seen]
+    heads = ("open phases inside, that trip", "terminal")
+    return ["", *table_lines(heads, ("both", "only A", "only B", "events"), cells)]
 
 
 def _class_row(named: Named) -> Row:

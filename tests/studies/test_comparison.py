@@ -67,3 +67,23 @@ def test_runs_that_differ_in_options_alone_do_not_look_alike(runs):
     marks = re.findall(r"→\S+ +([AB]) .* (default|\(\d\))$", text, flags=re.MULTILINE)
     assert set(marks) == {("A", "default"), ("B", "(1)")}
     assert len(marks) == 2 * len(result["comparisons"][0]["sections"])
+
+
+def test_open_phases_gained_and_lost_are_listed_by_class_and_terminal(runs):
+    result = compare_runs([runs / "reference", runs / "paper"])
+    lines = comparison_text(result).splitlines()
+    start = next(n for n, line in enumerate(lines) if line.startswith("open phases inside"))
+    printed = lines[start + 1 : lines.index("", start)]
+    expected = [
+        (class_words(own), terminal_name(row), *(own[key] for key in (*TRIPS, "trials")))
+        for row in result["comparisons"][0]["sections"]
+        for own in row["classes"]
+        if own["kind"] != "must_not_trip"
+        and own["side"] == "inside"
+        and own["name"] != "wiring"
+        and own["only_a"] + own["only_b"]
+    ]
+    assert expected
+    assert [" ".join(line.split()) for line in printed] == [
+        " ".join(map(str, row)) for row in expected
+    ]
