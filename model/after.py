@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .machines import carried_over
+from .machine_state import carried_over
 from .network import Network
 from .solve import TOLERANCE_PU, solve
 from .states import NOT_CONVERGED, Answer, Probes, State

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .machines import FLOOR_PU, machine_state
+from .machine_state import FLOOR_PU, machine_state
 from .network import Network
 from .solver.ladder import solve_block
 from .states import Answer, Probes, State, workspace

@@ -122,7 +122,7 @@ def apply_event(network: Network, before: State, after: State, event: Event) -> 
 
     ``before`` and ``after`` carry what the loads and the source do of their own accord. What
     DER keep from before the event is filled in once that has been solved
-    (``machines.carried_over``).
+    (``machine_state.carried_over``).
     """
     motor_load = network.machines.motor_load
     motors = slice(0, motor_load.size)

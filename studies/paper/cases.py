@@ -18,7 +18,7 @@ from ...detector.evidence import Phasors, evidence_of
 from ...detector.impedance import connection_impedance
 from ...detector.superimpose import superimposed
 from ...model.errors import OpenPhaseError
-from ...model.machines import carried_over
+from ...model.machine_state import carried_over
 from ...model.network import compile_network, locate
 from ...model.parts import Der, DerModel, Feeder, Line
 from ...model.points import Points, Terminal, find_points, into_line, point_probes

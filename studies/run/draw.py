@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ...detector.instruments import Errors, draw_errors
 from ...model.events.base import Event, apply_event
-from ...model.machines import DER_MODELS, machine_state
+from ...model.machine_state import machine_state
+from ...model.machines import DER_MODELS
 from ...model.network import CONNECTIONS
 from ...model.solve import quiet_state
 from ...model.states import State

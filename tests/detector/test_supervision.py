@@ -19,7 +19,7 @@ from openphase.detector.evidence import Phasors, evidence_of, with_alarm
 from openphase.detector.instruments import Bounds, Wiring, draw_errors, measure, miswire
 from openphase.detector.supervision import LIMITS, Alarm, fed_one_way, wiring_alarm
 from openphase.model import load_feeder
-from openphase.model.machines import machine_state
+from openphase.model.machine_state import machine_state
 from openphase.model.network import CONNECTIONS
 from openphase.model.parts import Der
 from openphase.model.solve import quiet_state

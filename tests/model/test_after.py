@@ -9,7 +9,7 @@ import pytest
 
 from openphase.model import load_feeder
 from openphase.model.after import OVERVOLTAGE_PU, solve_after
-from openphase.model.machines import carried_over, machine_state
+from openphase.model.machine_state import carried_over, machine_state
 from openphase.model.network import Network, compile_network, locate
 from openphase.model.parts import Der, DerModel
 from openphase.model.solve import quiet_state, solve

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openphase.model.events.base import Event, Places, apply_event, places_on
-from openphase.model.machines import carried_over
+from openphase.model.machine_state import carried_over
 from openphase.model.network import Network, compile_network
 from openphase.model.parts import (
     Der,

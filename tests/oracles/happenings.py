@@ -13,7 +13,7 @@ from openphase.detector.criteria import Options, Reason, Settings, verdict
 from openphase.detector.evidence import Evidence, Phasors, evidence_of
 from openphase.model import load_feeder
 from openphase.model.events.base import apply_event, no_event
-from openphase.model.machines import carried_over
+from openphase.model.machine_state import carried_over
 from openphase.model.network import locate
 from openphase.model.parts import Der, DerModel, Feeder
 from openphase.model.points import into_line

@@ -15,7 +15,8 @@ from oracles.random_happenings import Happening, random_happening
 
 from openphase.model.errors import InputError
 from openphase.model.events.base import apply_event, no_event
-from openphase.model.machines import DER_MODELS, carried_over, machine_state
+from openphase.model.machine_state import carried_over, machine_state
+from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
 from openphase.model.parts import Connection, Feeder, Transformer
 from openphase.model.solve import quiet_state, solve, steady_state
