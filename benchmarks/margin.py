@@ -33,7 +33,7 @@ VALIDATION = 40_000
 
 def attempt(seed: int, scenarios: int) -> Attempt:
     """A first attempt, in no ledger."""
-    return Attempt(number=1, scenarios=scenarios, population="", study="", seed=seed)
+    return Attempt(number=1, scenarios=scenarios, feeder="", study="", seed=seed)
 
 
 def main() -> None:

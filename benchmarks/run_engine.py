@@ -115,7 +115,7 @@ def _run(case: draw.Case, mix: list[draw.BlockId]) -> dict[str, Any]:
 
 def _mix(case: draw.Case, scenarios: int) -> list[draw.BlockId]:
     """Blocks of every class in the study's proportions, class after class."""
-    attempt = Attempt(number=1, scenarios=TRIALS, population="", study="", seed=SEED)
+    attempt = Attempt(number=1, scenarios=TRIALS, feeder="", study="", seed=SEED)
     planned = Counter(b.drawn for b in planned_blocks(case, Purpose.VALIDATE, attempt))
     share = scenarios / engine.BLOCK / planned.total()
     stops = np.rint(share * np.cumsum(list(planned.values()))).astype(int)
