@@ -30,7 +30,6 @@ from .run.digests import (
     population_digest,
     settings_digest,
 )
-from .run.engine import options_of
 from .run.ledger import LEDGER, Attempt, find_attempt, reserve, sheets_before
 from .run.options import options_text
 from .run.session import (
@@ -110,7 +109,7 @@ def _read_both(args: argparse.Namespace, feeder: Feeder) -> tuple[Study, Setting
     except InputError as error:
         faults += error.faults
     if args.settings != REFERENCE:
-        options = options_of(study or Study())
+        options = (study or Study()).detector.options()
         try:
             sheet = read_sheet(Path(args.settings), feeder, options)
         except InputError as error:

@@ -16,7 +16,6 @@ from ...optimise.certificate import share_of_alpha, two_sided, upper_bound
 from .cases import Case
 from .classes import FALLEN, FALLEN_OHM, REPORTED, DrawClass
 from .draw_event import possible_rows
-from .engine import options_of
 from .options import options_text, trigger_text
 from .status import load_side_status, status_of
 from .validation import Validation, add_up
@@ -134,11 +133,11 @@ def section_row(sheet: Sheet, t: int, given: Given) -> dict[str, Any]:
         status, reason = load_side_status(None)
         return row | _no_evidence() | {"status": status, "reason": reason}
     validation, alpha = sheet.validation, sheet.alpha
-    possible = possible_rows(case)[:, t] & bounded_rows()
+    possible = possible_rows(case)[:, t]
     classes = [
         _class_row(r, t, own, validation, alpha)
         for r in range(len(REPORTED))
-        if validation.trials[r, t] or possible[r]
+        if validation.trials[r, t] or (r in MUST_NOT and possible[r])
     ]
     must_not = [one for one in classes if one["kind"] == "must_not_trip"]
     row |= _dependability(t, 0, own, validation, alpha)
@@ -167,7 +166,7 @@ def section_row(sheet: Sheet, t: int, given: Given) -> dict[str, Any]:
 def _head(case: Case, t: int, given: Given) -> dict[str, Any]:
     """The keys that say which terminal and which setting a row is about."""
     terminal, study, own = case.points.terminals[t], case.study, given.settings
-    options = own.options if own else options_of(study)
+    options = own.options if own else study.detector.options()
     return {
         "local": terminal.local,
         "remote": terminal.remote,
@@ -222,11 +221,6 @@ def _no_evidence() -> dict[str, Any]:
         )
     )
     return empty | {"classes": [], "causes": [], "nearest_false_trip": None, "fixes": []}
-
-
-def bounded_rows() -> NDArray[np.bool_]:
-    """(R,): rows of ``REPORTED`` of which a bound is demanded."""
-    return np.array([own.kind == "must_not_trip" for own in REPORTED])
 
 
 def _class_row(

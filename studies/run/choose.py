@@ -19,7 +19,7 @@ from .cases import Case
 from .classes import REPORTED, DrawClass, Purpose
 from .draw import BlockId, whole_rounds
 from .draw_event import draw_event, event_sides, possible_rows
-from .engine import BLOCK, options_of
+from .engine import BLOCK
 from .ledger import Attempt
 from .status import common_window
 from .tally import Trained
@@ -71,6 +71,7 @@ def more_blocks(
     """
     n, blocks = attempt.scenarios, []
     possible = possible_rows(case)
+    planned = planned_blocks(case, had[0].purpose, attempt) if had else []
     for drawn in case.drawn:
         own = [which for which in had if which.drawn == drawn]
         rows = [r for r in BOUNDED if REPORTED[r].drawn == drawn]
@@ -78,7 +79,6 @@ def more_blocks(
         if not own or not wanted.any():
             continue
         least = int(trials[rows][wanted].min(initial=n))
-        planned = planned_blocks(case, own[0].purpose, attempt)
         most = MOST_TIMES * sum(which.drawn == drawn for which in planned)
         if least < n and len(own) < most:
             extra = math.ceil(1.2 * (n - least) * len(own) / max(least, 1))
@@ -231,7 +231,7 @@ def as_settings(study: Study, choice: Choice | Refusal | None) -> Settings | Non
         i_set_a=choice.i_set_a,
         v_set_pu=choice.v_set_pu,
         z_set_ohm=choice.z_set_ohm,
-        options=options_of(study),
+        options=study.detector.options(),
     )
 
 
@@ -241,5 +241,5 @@ def reference_settings(study: Study) -> Settings:
         i_set_a=study.reference.i_set_a,
         v_set_pu=float(Fraction(str(study.reference.v_set_pct)) / 100),
         z_set_ohm=study.reference.z_set_ohm,
-        options=options_of(study),
+        options=study.detector.options(),
     )

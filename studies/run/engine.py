@@ -18,12 +18,11 @@ from ...model.points import into_line, point_probes
 from ...model.sides import Side
 from ...model.solve import solve, steady_state
 from ...model.states import Answer, State
-from ..spec.study_file import Study
 from .cases import Case, Wired
 from .draw import Scenarios
 from .draw_event import event_sides
 
-__all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "bounds_of", "observe", "options_of"]
+__all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "bounds_of", "observe"]
 
 BLOCK = 2000  #: scenarios a block; part of every random stream, so never a matter of jobs
 TOLERANCE_PU = 1e-7  #: last change of a winding voltage; the instruments add 1.3e-4
@@ -42,22 +41,6 @@ class Observed:
     share: NDArray[np.float64]  #: (S,)
     flags: Int  #: (S,)
     fallen_ohm: NDArray[np.float64]  #: (S,) between a fallen conductor and earth; inf: none
-
-
-def options_of(study: Study) -> Options:
-    """The detector's options that a study asks for."""
-    own = study.detector
-    return Options(
-        negative_sign=own.negative_sign,
-        fallback=own.fallback,
-        compensated=own.compensated,
-        any_sequence=own.any_sequence,
-        floor_v=own.floor_v,
-        waive_sign_below_a=own.waive_sign_below_a,
-        unbalance=own.unbalance,
-        direction=own.direction,
-        both_ends=own.both_ends,
-    )
 
 
 def bounds_of(case: Case) -> Bounds:

@@ -17,7 +17,7 @@ from .along import distance_share
 from .cases import Case
 from .classes import FALLEN, FALLEN_OHM, INSIDE, REPORTED, DrawClass, reported_row
 from .draw import BlockId, draw_scenarios
-from .engine import BLOCK, Observed, observe, options_of
+from .engine import BLOCK, Observed, observe
 from .verdicts import pack_verdicts
 
 __all__ = ["PLACES", "Tested", "Trained", "judge_block", "train_block"]
@@ -63,7 +63,7 @@ class Tested:
 
 def train_block(case: Case, which: BlockId, size: int = BLOCK) -> Trained:
     """Draw and judge a training block for every setting of the device at once."""
-    options = options_of(case.study)
+    options = case.study.detector.options()
     seen = observe(case, draw_scenarios(case, which, size), options)
     grid, margin = case.grid, case.study.certificate.margin
     reach = reach_of(seen.evidence, options)

@@ -23,7 +23,6 @@ __all__ = [
     "margin_text",
     "percent",
     "picture",
-    "range_text",
     "right_cell",
     "setting_cell",
     "table",
@@ -116,11 +115,6 @@ def dependability_text(row: dict[str, Any]) -> str:
 def interval_text(low: float, high: float) -> str:
     """Both ends in percent, rounded outwards."""
     return f"{math.floor(low * 1000.0) / 10.0:.1f} .. {math.ceil(high * 1000.0) / 10.0:.1f} %"
-
-
-def range_text(ends: tuple[float, float]) -> str:
-    """The two ends of a range."""
-    return f"{setting_text(ends[0])} to {setting_text(ends[1])}"
 
 
 def ends(grid: tuple[float, ...]) -> tuple[float, float]:

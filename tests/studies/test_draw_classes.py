@@ -29,7 +29,7 @@ from openphase.model.states import NOT_CONVERGED
 from openphase.studies.run.cases import Wired
 from openphase.studies.run.classes import REPORTED, DrawClass, Purpose, reported_row
 from openphase.studies.run.draw import BlockId, Case, Scenarios, draw_scenarios, make_cases
-from openphase.studies.run.engine import Observed, observe, options_of
+from openphase.studies.run.engine import Observed, observe
 from openphase.studies.spec.parts import UNKNOWN_CONNECTION
 from openphase.studies.spec.study_file import DerDraw, default_study
 
@@ -49,7 +49,6 @@ NEEDING_MORE = (
     DrawClass.OPEN_WITH_DER_TRIP,
 )
 #: some of these stand at the source bus, where no line leads
-AT_DER = (DrawClass.DER_TRIP,)
 
 
 @functools.cache
@@ -70,7 +69,7 @@ def block(
 def seen(wires: int, group: int, drawn: DrawClass) -> tuple[Scenarios, Observed]:
     case = cases(wires)[group]
     scenarios = draw_scenarios(case, block(case, drawn), SIZE)
-    return scenarios, observe(case, scenarios, options_of(case.study))
+    return scenarios, observe(case, scenarios, case.study.detector.options())
 
 
 EVERYTHING = [
@@ -224,7 +223,7 @@ def test_a_block_drawn_twice_is_the_same(wires: int, drawn: DrawClass) -> None:
     again = draw_scenarios(make_cases(case.feeder, case.study)[1], block(case, drawn), SIZE)
     for one, other in ((scenarios.before, again.before), (scenarios.after, again.after)):
         assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
-    judged = observe(case, again, options_of(case.study))
+    judged = observe(case, again, case.study.detector.options())
     np.testing.assert_array_equal(judged.evidence.z_ohm, found.evidence.z_ohm)
     np.testing.assert_array_equal(judged.evidence.alarm, found.evidence.alarm)
 

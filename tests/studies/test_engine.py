@@ -27,7 +27,7 @@ from openphase.studies.run import tally
 from openphase.studies.run.choose import gather
 from openphase.studies.run.classes import FALLEN, REPORTED, DrawClass, Purpose, Side
 from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case, make_cases
-from openphase.studies.run.engine import Observed, observe, options_of
+from openphase.studies.run.engine import Observed, observe
 from openphase.studies.run.store import pack
 from openphase.studies.run.tally import Trained, judge_block, train_block
 from openphase.studies.run.verdicts import unpack_verdicts
@@ -75,7 +75,7 @@ def look(case: Case, which: BlockId, *options: Options) -> Observed:
 @functools.cache
 def seen_of(kind: str, drawn: DrawClass) -> Observed:
     case = case_of(kind)
-    return look(case, block(case, drawn), options_of(case.study))
+    return look(case, block(case, drawn), case.study.detector.options())
 
 
 @functools.cache
@@ -181,7 +181,7 @@ def test_fronts_are_what_nothing_outdoes_of_events_that_must_not_trip(
     kind: str, drawn: DrawClass
 ) -> None:
     case, known = case_of(kind), seen_of(kind, drawn)
-    reach = reach_of(known.evidence, options_of(case.study))
+    reach = reach_of(known.evidence, case.study.detector.options())
     for t, front in enumerate(trained_of(kind, drawn).front):
         index = front.scenario[:, 2]
         assert must_not_trip(case, drawn, known, t)[index].all()
@@ -199,8 +199,8 @@ def test_fronts_are_those_of_comparing_each_with_each(drawn: DrawClass) -> None:
     case, size = case_of("whole"), 60
     which = block(case, drawn)
     own = train_block(case, which, size)
-    seen = observe(case, draw_scenarios(case, which, size), options_of(case.study))
-    reach = reach_of(seen.evidence, options_of(case.study))
+    seen = observe(case, draw_scenarios(case, which, size), case.study.detector.options())
+    reach = reach_of(seen.evidence, case.study.detector.options())
     for t, front in enumerate(own.front):
         wanted = np.flatnonzero(_must_not(case, drawn, seen, t))
         names = np.array([[int(drawn), 0, n, case.group.index] for n in wanted.tolist()], np.int64)
@@ -264,8 +264,8 @@ def test_with_one_setting_for_all_a_terminal_is_judged_where_it_looks_away_too()
         train_block(case, block(case, drawn), SIZE)
         for drawn in (DrawClass.LOAD_STEP, DrawClass.OPEN_PHASE)
     )
-    everywhere = look(case, block(case, DrawClass.OPEN_PHASE), options_of(one))
-    lax = Settings(i_set_a=0.1, v_set_pu=0.05, z_set_ohm=0.1, options=options_of(one))
+    everywhere = look(case, block(case, DrawClass.OPEN_PHASE), one.detector.options())
+    lax = Settings(i_set_a=0.1, v_set_pu=0.05, z_set_ohm=0.1, options=one.detector.options())
     trips = verdict(everywhere.evidence, lax) == Reason.TRIP
     for t in turned[1:]:
         assert count_tensor(case.grid, steps.false[t]).any()
