@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 
 from .line_matrices import phase_mask
-from .parts import Feeder, InlineTransformer
+from .parts import Feeder, InlineTransformer, Line, Regulator, Switch
 
 __all__ = ["bus_phases", "bus_volts", "to_side_volts"]
 
@@ -28,10 +28,15 @@ def _from_side_volts(unit: InlineTransformer) -> float:
     return unit.kv_from * 1000.0 / ROOT
 
 
+def _conductors(feeder: Feeder) -> list[Line | Switch | Regulator]:
+    """What joins two buses of one nominal voltage, phase by phase."""
+    return [*feeder.lines, *feeder.switches, *feeder.regulators]
+
+
 def bus_volts(feeder: Feeder) -> dict[str, float]:
     """Nominal phase-to-earth volts of every bus, all switches taken as closed."""
     joined: defaultdict[str, list[tuple[str, InlineTransformer | None, bool]]] = defaultdict(list)
-    for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
+    for part in _conductors(feeder):
         joined[part.from_bus].append((part.to_bus, None, True))
         joined[part.to_bus].append((part.from_bus, None, False))
     for unit in feeder.inline_transformers:
@@ -54,7 +59,7 @@ def bus_volts(feeder: Feeder) -> dict[str, float]:
 def bus_phases(feeder: Feeder) -> dict[str, int]:
     """Bit mask of the phases that reach every bus from the source, all switches closed."""
     joined: defaultdict[str, list[tuple[str, int, int]]] = defaultdict(list)
-    for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
+    for part in _conductors(feeder):
         mask = phase_mask(part.phases)
         joined[part.from_bus].append((part.to_bus, mask, 0))
         joined[part.to_bus].append((part.from_bus, mask, 0))

@@ -192,7 +192,8 @@ def _cut(
     names = [ends[0], *(_tee(line.name, x) for x in fractions[1:-1]), ends[1]]
     code = None if line.code is None else codes[line.code]
     whole = line.length_km * z_ohm_per_km(line, code)
-    half = 0.5j * omega * line.length_km * 1e-9 * shunt_nf_per_km(line, code)
+    farad = 0.5e-9 * line.length_km * shunt_nf_per_km(line, code)
+    half = np.asarray(1j * omega * farad, np.complex128)
     mask = phase_mask(line.phases)
     return [
         Piece(
