@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .inline import regulator_ratio, regulator_reference
-from .line_matrices import phase_rows
 from .machines import Machines, has_motor, load_va
 from .parts import Capacitor, Der, Feeder, Load, Source, Transformer
+from .phases import phase_rows
 from .pieces import Piece, node_name
 from .solver.bank import D_D, D_YG, Y_D, YG_D, YG_YG
 
