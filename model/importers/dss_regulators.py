@@ -120,7 +120,7 @@ def _add_bank(
             from_bus=banks.buses.of(start),
             to_bus=banks.buses.of(end),
             taps=(taps[0], taps[1], taps[2]),
-            step_pct=step * 100.0,
+            step_pct=_percent(step),
             most_taps=max(first.windings[1].most_taps, *(abs(tap) for tap in taps)),
             phases=letters(sorted(nodes)).replace(reference, ""),
             reference=reference,
@@ -219,10 +219,15 @@ def with_tap_changer(
         from_bus=between,
         to_bus=row.to_bus,
         taps=(round(tap), round(tap), round(tap)),
-        step_pct=step * 100.0,
+        step_pct=_percent(step),
         most_taps=max(second.most_taps, abs(round(tap))),
         gang=True,
     )
     neutral = row.to_neutral_ohm / second.tap**2
     banks.findings.note(f"transformer {unit.name}: its tap changer became regulator {row.name}")
     return replace(row, to_bus=between, to_tap=1.0, to_neutral_ohm=neutral), regulator
+
+
+def _percent(step: float) -> float:
+    """Return a step in percent, without the last digits that the file's limits left."""
+    return float(f"{step * 100.0:.10g}")
