@@ -65,8 +65,9 @@ def add_regulator(
 ) -> Through:
     """One autotransformer for each phase; its unknown is the current out of the to-side.
 
-    ``V_to = ratio * (V_from - z * I_from)`` between phase and reference, where both sides'
-    currents enter and return.
+    From phase to reference ``V_to = ratio * (V_from - z * I_from)``, where both sides' currents
+    return to the reference of their own side. Of a closed delta, whose references move
+    themselves, the winding in series adds ``ratio - 1`` of what the from-side has between them.
     """
     through = Through()
     near, far = regulator.from_bus, regulator.to_bus
@@ -82,8 +83,11 @@ def add_regulator(
         (current,) = circuit.columns(1, circuit.s_base / v)
         passes(k, current, ratio, 1.0)
         terms = [*circuit.voltage((far, k), 1), *circuit.voltage((near, k), -ratio)]
-        if regulator.reference != "earth":
-            other = NEXT[k] if regulator.reference == "next" else rows(regulator.reference)[0]
+        if regulator.reference == "next":
+            passes(NEXT[k], current, 1.0 - ratio, 0.0)
+            terms += circuit.voltage((near, NEXT[k]), ratio - 1.0)
+        elif regulator.reference != "earth":
+            (other,) = rows(regulator.reference)
             passes(other, current, -ratio, -1.0)
             terms += [*circuit.voltage((far, other), -1), *circuit.voltage((near, other), ratio)]
         z = regulator.z_ohm * ratio**2

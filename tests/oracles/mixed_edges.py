@@ -225,10 +225,8 @@ def _three_phase(ground: Ground, upper: Bus) -> None:
         from_neutral_ohm=_neutral_ohm(rng, zone) if connection.startswith("Yg") else 0j,
         to_neutral_ohm=_neutral_ohm(rng, below) if connection.endswith("/Yg") else 0j,
     )
-    if connection == "Yg/Yg" and rng.random() < 0.15:
-        unit = replace(unit, leakage_pu=0j)
     ground.inlines.append(unit)
-    if unit.leakage_pu and rng.random() < 0.2:
+    if rng.random() < 0.2:
         ground.inlines.append(
             replace(
                 _unit(ground, ground.name("X"), kva * 0.7),

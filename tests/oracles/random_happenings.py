@@ -99,7 +99,7 @@ def phases_of(feeder: Feeder, bus: str) -> str:
     for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
         if bus in (part.from_bus, part.to_bus):
             found += part.phases
-        for regulator in feeder.regulators:
+    for regulator in feeder.regulators:
         if regulator.reference != "earth" and bus in (regulator.from_bus, regulator.to_bus):
             found += "abc" if regulator.reference == "next" else regulator.reference
     for unit in feeder.inline_transformers:

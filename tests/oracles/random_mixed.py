@@ -171,7 +171,7 @@ def _load(ground: Ground, n: int, units: list[Transformer], linear: bool) -> Loa
             branch_kv=kv,
         )
     if rng.random() < 0.3:
-        load = replace(load, kvar=load.kw * float(rng.uniform(-0.3, 0.7)))
+        load = replace(load, power_factor=1.0, kvar=load.kw * float(rng.uniform(-0.3, 0.7)))
     return load if linear else replace(load, **_law(rng))
 
 
@@ -185,7 +185,7 @@ def _law(rng: np.random.Generator) -> dict[str, Any]:
     }
     if rng.random() < ZIP:
         p, q = rng.dirichlet(np.ones(3), 2)
-        law["zip"] = tuple(float(share) for share in (*p, *q))
+        law = {"exponent": 2.0, "zip": tuple(float(share) for share in (*p, *q))}
     if rng.random() < 0.5:
         law["v_min_pu"] = float(rng.uniform(0.6, 0.95))
         law["v_low_pu"] = 0.5 if rng.random() < 0.5 else None
@@ -261,8 +261,9 @@ def _capacitor(ground: Ground, n: int) -> Capacitor:
 
 
 def _points(ground: Ground) -> tuple[Point, ...]:
-    """At some ends of lines."""
+    """At some ends of lines of three phases."""
     rng = ground.rng
-    ends = [(line, bus) for line in ground.lines for bus in (line.from_bus, line.to_bus)]
+    whole = [line for line in ground.lines if len(line.phases) == 3]
+    ends = [(line, bus) for line in whole for bus in (line.from_bus, line.to_bus)]
     kept = [end for end in ends if rng.random() < 0.2]
     return tuple(Point(name=f"P{n}", bus=bus, line=line.name) for n, (line, bus) in enumerate(kept))

@@ -253,14 +253,25 @@ def test_an_open_delta_refers_to_the_phase_that_goes_through() -> None:
     np.testing.assert_allclose(got.i_into["R"], into, rtol=1e-9)
 
 
-def test_a_closed_delta_raises_what_is_between_the_phases() -> None:
+def test_a_closed_delta_adds_what_is_between_the_phases() -> None:
+    """By all taps alike: the voltages between the phases grow by more, and turn."""
     regulator = a_regulator(reference="next", taps=(8, 8, 8), z_ohm=0.2 + 1j)
+    got = solved(regulators=(regulator,), loads=(a_load("B", 900),))
+    z_load = V**2 / 300e3
+    raised = V + 0.05 * V * (1 - ABC[1])
+    v = raised * z_load / (z_load + 1.05**2 * (0.2 + 1j))
+    np.testing.assert_allclose(got.v["B"], v * ABC, rtol=1e-12)
+    into = (v / z_load) * raised.conjugate() / V
+    np.testing.assert_allclose(got.i_into["R"], into * ABC, rtol=1e-12)
+
+
+def test_a_closed_delta_of_one_tap_moves_one_phase() -> None:
+    regulator = a_regulator(reference="next", taps=(0, 8, 0))
     got = solved(regulators=(regulator,), loads=(a_load("B", 900, connection="delta"),))
-    z_load = 12000**2 / 300e3
-    v_ll = 1.05 * 12000 * z_load / (z_load + 1.05**2 * (0.2 + 1j))
-    v = got.v["B"]
-    np.testing.assert_allclose(np.abs(v - np.roll(v, -1)), abs(v_ll), rtol=1e-9)
-    assert {phase for _, phase in got.floating} == {0, 1, 2}
+    v_b = V * (ABC[1] + 0.05 * (ABC[1] - ABC[2]))
+    np.testing.assert_allclose(got.v["B"], [V, v_b, V * ABC[2]], rtol=1e-12)
+    i, out = got.i_into["R"], got.i_out["R"]
+    np.testing.assert_allclose(i, [out[0], 1.05 * out[1], out[2] - 0.05 * out[1]], rtol=1e-12)
 
 
 def at_law(pu: float, **law: Any) -> complex:
