@@ -10,7 +10,6 @@ import numpy as np
 from oracles.mixed_ground import ROOT, Bus, Ground, Zone, chosen, polar, some_of
 
 from openphase.model.parts import (
-    InlineConnection,
     InlineTransformer,
     Line,
     LineCode,
@@ -22,9 +21,7 @@ from openphase.model.parts import (
 
 __all__ = ["add_line", "grow", "tie"]
 
-THREE_PHASE: tuple[InlineConnection, ...] = (
-    *("Yg/Yg", "Y/Yg", "Yg/Y", "Y/Y", "D/Yg", "D/Y", "Yg/D", "Y/D", "D/D"),
-)
+WINDINGS = ("Yg", "Y", "D")
 BANKS: tuple[tuple[tuple[str, str], ...], ...] = (
     (("a", "a"), ("b", "b"), ("c", "c")),
     (("ab", "ab"), ("bc", "bc")),
@@ -197,47 +194,44 @@ def _unit(ground: Ground, name: str, kva: float) -> InlineTransformer:
 def _three_phase(ground: Ground, upper: Bus) -> None:
     """Of any connection that the zone allows; sometimes like one there is, or two in parallel."""
     rng, zone = ground.rng, upper.zone
-    kinds = [kind for kind in THREE_PHASE if zone.earthed or not kind.startswith("Yg")]
-    connection = chosen(rng, kinds)
-    shift: Shift = "lag" if rng.random() < 0.5 else "lead"
+    near, far = chosen(rng, WINDINGS), chosen(rng, WINDINGS)
     kv = float(rng.choice([0.48, 4.16, 12.0]))
+    shift: Shift = "lag" if (near == "D") == (far == "D") or rng.random() < 0.5 else "lead"
+    turned = bool(rng.random() < 0.2)
     twins = [own for own in ground.buses if own.zone.like[1:2] == zone.like[:1]]
     if twins and rng.random() < 0.5:
-        connection, shift, kv = chosen(rng, twins).zone.like[2:5]  # type: ignore[assignment]
-    if connection.startswith("Yg") and not zone.earthed:
+        near, far, kv, shift, turned = chosen(rng, twins).zone.like[2:]  # type: ignore[assignment]
+    if near == "Yg" and not zone.earthed:
         return _lateral(ground, upper)
     kva = zone.va / 1000.0 * float(rng.uniform(0.2, 0.6))
-    to_earth = connection.endswith("/Yg") and not connection.startswith("Y/")
     below = Zone(
         volts=kv * 1000.0 / ROOT,
         va=kva * 1000.0,
-        earthed=to_earth or bool(rng.random() < 0.3),
-        like=(ground.name("zone"), zone.like[0], connection, shift, kv),
+        earthed=(far == "Yg" and near != "Y") or bool(rng.random() < 0.3),
+        like=(ground.name("zone"), zone.like[0], near, far, kv, shift, turned),
     )
+    sides = [
+        (near, upper.name, zone.volts * ROOT / 1000.0, zone),
+        (far, ground.bus("abc", below).name, kv, below),
+    ]
+    (first, start, kv_from, side), (second, end, kv_to, other) = sides[::-1] if turned else sides
     unit = replace(
         _unit(ground, ground.name("X"), kva),
-        connection=connection,
-        from_bus=upper.name,
-        to_bus=ground.bus("abc", below).name,
-        kv_from=zone.volts * ROOT / 1000.0,
-        kv_to=kv,
+        connection=f"{first}/{second}",
+        from_bus=start,
+        to_bus=end,
+        kv_from=kv_from,
+        kv_to=kv_to,
         shift=shift,
-        from_neutral_ohm=_neutral_ohm(rng, zone) if connection.startswith("Yg") else 0j,
-        to_neutral_ohm=_neutral_ohm(rng, below) if connection.endswith("/Yg") else 0j,
+        from_neutral_ohm=_neutral_ohm(rng, side) if first == "Yg" else 0j,
+        to_neutral_ohm=_neutral_ohm(rng, other) if second == "Yg" else 0j,
     )
     ground.inlines.append(unit)
     if rng.random() < 0.2:
+        second_one = _unit(ground, ground.name("X"), kva * 0.7)
+        own = ("name", "rating_kva", "leakage_pu", "magnetizing_pu")
         ground.inlines.append(
-            replace(
-                _unit(ground, ground.name("X"), kva * 0.7),
-                **{
-                    key: getattr(unit, key)
-                    for key in (
-                        *("connection", "from_bus", "to_bus", "kv_from", "kv_to", "shift"),
-                        *("from_tap", "to_tap", "from_neutral_ohm"),
-                    )
-                },
-            )
+            replace(unit, to_neutral_ohm=0j, **{key: getattr(second_one, key) for key in own})
         )
     return None
 
