@@ -48,7 +48,7 @@ def as_dss(feeder: Feeder, cut: Cut | None = None, held: Iterable[str] = ()) -> 
         raise ValueError("hanging transformers and DER are not written")
     volts = bus_volts(feeder)
     writer = _Writer(feeder, _joined(feeder))
-    commands = ["clear", writer.source()]
+    commands = ["clear", *writer.source()]
     for line in feeder.lines:
         commands += writer.line(line, cut if cut and cut.line == line.name else None)
     for unit in feeder.inline_transformers:
@@ -56,7 +56,8 @@ def as_dss(feeder: Feeder, cut: Cut | None = None, held: Iterable[str] = ()) -> 
     for regulator in feeder.regulators:
         commands += writer.regulator(regulator, volts[regulator.from_bus])
     for load in feeder.loads:
-        assert load.place is not None and load.place.bus is not None
+        assert load.place is not None
+        assert load.place.bus is not None
         commands += writer.load(load, load.place.bus, volts[load.place.bus])
     for bank in feeder.capacitors:
         assert bank.place.bus is not None
@@ -101,15 +102,20 @@ class _Writer:
         self.neutrals[self.bus_of(bus)] += 1
         return 3 + self.neutrals[self.bus_of(bus)]
 
-    def source(self) -> str:
+    def source(self) -> list[str]:
         own = self.feeder.source
-        if own.neutral != "solid":
-            raise ValueError("only a solidly earthed source is written")
-        return (
+        main = (
             f"new circuit.c bus1={self.bus_of(own.bus)} basekv={own.kv_ll!r} pu={own.emf_pu!r} "
             f"angle={own.angle_deg!r} basefreq={own.frequency_hz!r} frequency={own.frequency_hz!r} "
             f"z1={_pair(own.z1_ohm)} z2={_pair(own.z2_ohm)} z0={_pair(own.z0_ohm)}"
         )
+        if own.neutral == "solid":
+            return [main]
+        main += " bus2=star.1.1.1"
+        if own.neutral == "isolated":
+            return [main]
+        z = own.neutral_ohm
+        return [main, f"new reactor.star phases=1 bus1=star.1 r={z.real!r} x={z.imag!r}"]
 
     def line(self, line: Line, cut: Cut | None) -> list[str]:
         start, end = self.at(line.from_bus, line.phases), self.at(line.to_bus, line.phases)

@@ -174,7 +174,7 @@ class _Grown:
         rng, phases = self.rng, self.phases[bus]
         reference = "earth"
         if phases == "abc" and rng.random() < 0.4:
-            reference = str(rng.choice(list("abc")))
+            reference = str(rng.choice(["a", "b", "c", "next"]))
         far = self.seen(self.name(), phases, self.zone[bus])
         base = self.volts[self.zone[bus]] ** 2 / 2.0
         self.regulators.append(
@@ -290,6 +290,7 @@ def _rows(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
 def _assembled(grown: _Grown, loads: tuple[Load, ...], capacitors: tuple[Capacitor, ...]) -> Feeder:
     rng = np.random.default_rng(len(grown.lines))
     short = grown.kv**2 / 200.0
+    neutral = ("solid", "solid", "solid", "resistor", "isolated")[int(rng.integers(5))]
     return Feeder(
         name="mixed",
         source=Source(
@@ -301,6 +302,8 @@ def _assembled(grown: _Grown, loads: tuple[Load, ...], capacitors: tuple[Capacit
             z0_ohm=complex(0.2, float(rng.uniform(1.5, 3.0))) * short,
             frequency_hz=60.0,
             angle_deg=float(rng.choice([0.0, 30.0])),
+            neutral=neutral,
+            neutral_ohm=0j if neutral in ("solid", "isolated") else complex(2.0, 3.0),
         ),
         lines=tuple(grown.lines),
         transformers=(),
