@@ -18,7 +18,7 @@ from openphase.model.buses import bus_volts
 from openphase.model.line_matrices import phase_rows, shunt_nf_per_km, z_ohm_per_km
 from openphase.model.parts import Capacitor, Feeder, InlineTransformer, Line, Load, Regulator
 
-__all__ = ["Cut", "as_dss", "node_name"]
+__all__ = ["Cut", "as_dss", "joined_buses", "node_name"]
 
 ROOT = 3.0**0.5
 SMALL_OHM = 1e-6  #: of what has no impedance at all and cannot be one bus
@@ -47,7 +47,7 @@ def as_dss(feeder: Feeder, cut: Cut | None = None, held: Iterable[str] = ()) -> 
     if feeder.transformers or feeder.ders:
         raise ValueError("hanging transformers and DER are not written")
     volts = bus_volts(feeder)
-    writer = _Writer(feeder, _joined(feeder))
+    writer = _Writer(feeder, joined_buses(feeder))
     commands = ["clear", *writer.source()]
     for line in feeder.lines:
         commands += writer.line(line, cut if cut and cut.line == line.name else None)
@@ -67,7 +67,7 @@ def as_dss(feeder: Feeder, cut: Cut | None = None, held: Iterable[str] = ()) -> 
     return commands
 
 
-def _joined(feeder: Feeder) -> Callable[[str], str]:
+def joined_buses(feeder: Feeder) -> Callable[[str], str]:
     """Each bus's name in the circuit: buses that closed switches join are one.
 
     A switch must carry every phase that the bus behind it has.
