@@ -242,10 +242,14 @@ class _Writer:
             conns.append("delta" if kind == "D" and own.connection != "single" else "wye")
         half = own.leakage_pu.real * 50
         phases = 1 if own.connection == "single" else 3
+        # the engine shifts the side of lower voltage
+        shift = own.shift
+        if own.kv_to > own.kv_from:
+            shift = "lead" if own.shift == "lag" else "lag"
         out.append(
             f"new transformer.{own.name} phases={phases} windings=2 "
             f"buses=[{' '.join(buses)}] conns=[{' '.join(conns)}] {self._ratings(own)} "
-            f"%rs=[{half!r} {half!r}] xhl={own.leakage_pu.imag * 100!r} leadlag={own.shift}"
+            f"%rs=[{half!r} {half!r}] xhl={own.leakage_pu.imag * 100!r} leadlag={shift}"
         )
         return out
 
