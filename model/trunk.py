@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import heapq
 from collections import defaultdict, deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from .buses import bus_volts
 from .line_matrices import z1_ohm
 from .parts import Feeder, InlineTransformer, Line, Place, Regulator, Switch
+from .zones import outwards
 
 __all__ = ["Step", "Trunk", "find_trunk"]
 
@@ -60,7 +60,7 @@ def find_trunk(feeder: Feeder) -> Trunk | None:
         return None
     ohm = {name: abs(z1_ohm(feeder, line)) for name, line in network.items()}
     inside = {bus for line in network.values() for bus in (line.from_bus, line.to_bus)}
-    head = next(bus for bus in _outwards(feeder) if bus in inside)
+    head = next(bus for bus in outwards(feeder) if bus in inside)
     distance, before = _ways(head, joined, ohm)
     end, what = _farthest(feeder, distance)
     path: list[Way] = []
@@ -121,23 +121,6 @@ def _longest_network(
         if own and rank > best:
             best, found = rank, {line.name: line for line in feeder.lines if line.name in own}
     return found
-
-
-def _outwards(feeder: Feeder) -> Iterator[str]:
-    """Buses in the order of their distance from the source, in edges."""
-    joined: defaultdict[str, list[str]] = defaultdict(list)
-    closed = (switch for switch in feeder.switches if switch.closed)
-    for part in (*feeder.lines, *closed, *feeder.regulators, *feeder.inline_transformers):
-        joined[part.from_bus].append(part.to_bus)
-        joined[part.to_bus].append(part.from_bus)
-    seen, waiting = {feeder.source.bus}, deque([feeder.source.bus])
-    while waiting:
-        bus = waiting.popleft()
-        yield bus
-        for far in joined[bus]:
-            if far not in seen:
-                seen.add(far)
-                waiting.append(far)
 
 
 def _ways(

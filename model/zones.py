@@ -7,12 +7,12 @@ remains joined is a zone. Switches count in their normal state.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from .parts import Capacitor, Der, Feeder, Load, Place, Point, Section, Transformer
 
-__all__ = ["Node", "Zones", "adjacent_sections", "node_of", "zones_of"]
+__all__ = ["Node", "Zones", "adjacent_sections", "node_of", "outwards", "zones_of"]
 
 Node = tuple[str, str]
 """``("bus", name)``, or ``("line", name)`` for what lies between a line's two ends."""
@@ -95,6 +95,23 @@ def adjacent_sections(
             if _has_line_between(joined, *ends):
                 sections.append(Section(local=points[local].name, remote=points[remote].name))
     return tuple(sections), tuple(left_out)
+
+
+def outwards(feeder: Feeder) -> Iterator[str]:
+    """Buses in the order of their distance from the source, in edges."""
+    joined: defaultdict[str, list[str]] = defaultdict(list)
+    closed = (switch for switch in feeder.switches if switch.closed)
+    for part in (*feeder.lines, *closed, *feeder.regulators, *feeder.inline_transformers):
+        joined[part.from_bus].append(part.to_bus)
+        joined[part.to_bus].append(part.from_bus)
+    seen, waiting = {feeder.source.bus}, deque([feeder.source.bus])
+    while waiting:
+        bus = waiting.popleft()
+        yield bus
+        for far in joined[bus]:
+            if far not in seen:
+                seen.add(far)
+                waiting.append(far)
 
 
 def _joined(feeder: Feeder, points: Iterable[Point]) -> Joined:
