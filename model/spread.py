@@ -53,8 +53,8 @@ def spread_points(feeder: Feeder, count: int = 4) -> Spread:
         return Spread(feeder=feeder, said=(), inside=_inside(feeder))
     trunk = find_trunk(feeder)
     if trunk is None:
-        said = ("no measuring points are given, and no three-phase line could have any",)
-        return Spread(feeder=feeder, said=said, inside=())
+        none = "no measuring points are given, and no three-phase line could have any"
+        return Spread(feeder=feeder, said=(none,), inside=())
     between = _places(trunk.steps, count - 2)
     points = _points(trunk.steps, between)
     sections, left_out = adjacent_sections(feeder, points)

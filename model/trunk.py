@@ -89,7 +89,8 @@ def _is_whole(part: Joint | InlineTransformer) -> bool:
 def _joined(feeder: Feeder) -> dict[str, list[Way]]:
     """What three-phase lines, closed switches and regulators join, without transformers."""
     joined: defaultdict[str, list[Way]] = defaultdict(list)
-    for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
+    parts: list[Joint] = [*feeder.lines, *feeder.switches, *feeder.regulators]
+    for part in parts:
         if _is_whole(part):
             joined[part.from_bus].append((part.to_bus, part))
             joined[part.to_bus].append((part.from_bus, part))

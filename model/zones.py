@@ -10,9 +10,22 @@ from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from .parts import Capacitor, Der, Feeder, Load, Place, Point, Section, Transformer
+from .parts import (
+    Capacitor,
+    Der,
+    Feeder,
+    InlineTransformer,
+    Line,
+    Load,
+    Place,
+    Point,
+    Regulator,
+    Section,
+    Switch,
+    Transformer,
+)
 
-__all__ = ["Node", "Zones", "adjacent_sections", "node_of", "outwards", "zones_of"]
+__all__ = ["Node", "Zones", "adjacent_sections", "nodes_of", "outwards", "zones_of"]
 
 Node = tuple[str, str]
 """``("bus", name)``, or ``("line", name)`` for what lies between a line's two ends."""
@@ -40,22 +53,26 @@ class Zones:
     exits: tuple[tuple[int, ...], ...]
 
 
-def node_of(feeder: Feeder, part: Load | Der | Capacitor | Transformer) -> Node:
-    """Where a part stands, or the transformer that it is behind; at a line's end it is the bus."""
-    if not isinstance(part, (Capacitor, Transformer)) and part.transformer is not None:
-        part = next(unit for unit in feeder.transformers if unit.name == part.transformer)
-    assert part.place is not None
-    return _node(feeder, part.place)
+def nodes_of(feeder: Feeder, parts: Sequence[Load | Der | Capacitor | Transformer]) -> list[Node]:
+    """Where each part stands, or the transformer that it is behind; a line's ends are buses."""
+    units = {unit.name: unit.place for unit in feeder.transformers}
+    ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
 
+    def node(place: Place | None) -> Node:
+        assert place is not None
+        if place.bus is not None:
+            return "bus", place.bus
+        assert place.line is not None
+        if place.at in (0.0, 1.0):
+            return "bus", ends[place.line][int(place.at)]
+        return "line", place.line
 
-def _node(feeder: Feeder, place: Place) -> Node:
-    if place.bus is not None:
-        return "bus", place.bus
-    assert place.line is not None
-    if place.at in (0.0, 1.0):
-        line = next(item for item in feeder.lines if item.name == place.line)
-        return "bus", line.to_bus if place.at else line.from_bus
-    return "line", place.line
+    return [
+        node(units[part.transformer])
+        if isinstance(part, (Load, Der)) and part.transformer is not None
+        else node(part.place)
+        for part in parts
+    ]
 
 
 def zones_of(feeder: Feeder, points: Sequence[Point]) -> Zones:
@@ -101,7 +118,8 @@ def outwards(feeder: Feeder) -> Iterator[str]:
     """Buses in the order of their distance from the source, in edges."""
     joined: defaultdict[str, list[str]] = defaultdict(list)
     closed = (switch for switch in feeder.switches if switch.closed)
-    for part in (*feeder.lines, *closed, *feeder.regulators, *feeder.inline_transformers):
+    parts: list[Line | Switch | Regulator | InlineTransformer] = [*feeder.lines, *closed]
+    for part in [*parts, *feeder.regulators, *feeder.inline_transformers]:
         joined[part.from_bus].append(part.to_bus)
         joined[part.to_bus].append(part.from_bus)
     seen, waiting = {feeder.source.bus}, deque([feeder.source.bus])
@@ -131,7 +149,8 @@ def _joined(feeder: Feeder, points: Iterable[Point]) -> Joined:
             if (bus, line.name) not in cuts:
                 join(("line", line.name), ("bus", bus))
     closed = (switch for switch in feeder.switches if switch.closed)
-    for part in (*closed, *feeder.regulators, *feeder.inline_transformers):
+    parts: list[Switch | Regulator | InlineTransformer] = [*closed, *feeder.regulators]
+    for part in [*parts, *feeder.inline_transformers]:
         join(("bus", part.from_bus), ("bus", part.to_bus))
     for switch in feeder.switches:
         joined.setdefault(("bus", switch.from_bus), [])

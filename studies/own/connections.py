@@ -60,12 +60,14 @@ def with_transformers(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
     """
     table = read_table(path)
     said = _read(table)
-    names = [unit.name for unit in (*feeder.inline_transformers, *feeder.transformers)]
+    names = [unit.name for unit in feeder.inline_transformers]
+    names += [unit.name for unit in feeder.transformers]
     joined: list[str] = []
     not_joined: list[tuple[str, str]] = []
     notes: list[str] = []
     for row in said:
         name = by_name(names, row.unit)
+        why: str | None
         if name is None:
             why = f"no transformer has that name{did_you_mean(row.unit, names)}"
         elif name in joined:

@@ -9,7 +9,18 @@ import math
 from dataclasses import replace
 
 from ...model.buses import to_side_volts
-from ...model.parts import Feeder, InlineTransformer, Load, Place, Transformer
+from ...model.parts import (
+    Capacitor,
+    Der,
+    Feeder,
+    InlineTransformer,
+    Line,
+    Load,
+    Place,
+    Regulator,
+    Switch,
+    Transformer,
+)
 
 __all__ = ["hang", "why_not_hanging"]
 
@@ -19,7 +30,11 @@ CLOSE = 0.002  #: relative difference of voltages that are nominally the same
 def why_not_hanging(feeder: Feeder, unit: InlineTransformer) -> str | None:
     """Why a three-phase unit cannot hang on the feeder with its loads; None where it can."""
     bus = unit.to_bus
-    joining = (*feeder.lines, *feeder.switches, *feeder.regulators)
+    joining: list[Line | Switch | Regulator] = [
+        *feeder.lines,
+        *feeder.switches,
+        *feeder.regulators,
+    ]
     beyond = [part.name for part in joining if bus in (part.from_bus, part.to_bus)]
     beyond += [
         other.name
@@ -28,11 +43,12 @@ def why_not_hanging(feeder: Feeder, unit: InlineTransformer) -> str | None:
     ]
     if beyond:
         return f"a network lies behind it ({beyond[0]})"
-    others = [
-        part.name
-        for part in (*feeder.capacitors, *feeder.ders, *feeder.transformers)
-        if part.place is not None and part.place.bus == bus
+    standing: list[Capacitor | Der | Transformer] = [
+        *feeder.capacitors,
+        *feeder.ders,
+        *feeder.transformers,
     ]
+    others = [part.name for part in standing if part.place == Place(bus=bus)]
     if others:
         return f"more than loads stands behind it ({others[0]})"
     uneven = [load.name for load in _behind(feeder, unit) if len(load.phases) < 3]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast, get_args
 
-from ...model.parts import Feeder, Line, Point, VoltageSide
+from ...model.parts import Feeder, Line, Point, Regulator, Switch, VoltageSide
 from ...model.reading.fields import did_you_mean
 from ...model.zones import adjacent_sections, outwards
 from .match import Match, by_name
@@ -114,13 +114,13 @@ def _where(feeder: Feeder) -> _Where:
     for line in feeder.lines:
         at[line.from_bus].append(line)
         at[line.to_bus].append(line)
-    joining = (*feeder.lines, *feeder.switches, *feeder.regulators, *feeder.inline_transformers)
-    buses = dict.fromkeys(bus for part in joining for bus in (part.from_bus, part.to_bus))
+    order = {bus: n for n, bus in enumerate(outwards(feeder))}
+    buses = dict.fromkeys([*order, *at])
     return _Where(
         buses=tuple(buses),
         lines={line.name: line for line in feeder.lines},
         at=at,
-        order={bus: n for n, bus in enumerate(outwards(feeder))},
+        order=order,
     )
 
 
@@ -142,7 +142,8 @@ def _placed(feeder: Feeder, where: _Where, row: Point) -> Point | str:
     line = by_name(tuple(where.lines), wanted)
     if line is not None:
         return _on_line(where.lines[line], row)
-    joints = {part.name: part for part in (*feeder.switches, *feeder.regulators)}
+    joints: dict[str, Switch | Regulator] = {part.name: part for part in feeder.switches}
+    joints |= {part.name: part for part in feeder.regulators}
     joint = by_name(tuple(joints), wanted)
     if joint is None:
         near = did_you_mean(wanted, where.lines)
