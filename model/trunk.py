@@ -54,13 +54,13 @@ def find_trunk(feeder: Feeder) -> Trunk | None:
     farthest from the head.
     """
     volts = bus_volts(feeder)
-    joined = _joined(feeder)
-    network = _longest_network(feeder, joined, volts)
+    joined, fed = _joined(feeder), tuple(outwards(feeder))
+    network = _longest_network(feeder, joined, {bus: volts[bus] for bus in fed})
     if not network:
         return None
     ohm = {name: abs(z1_ohm(feeder, line)) for name, line in network.items()}
     inside = {bus for line in network.values() for bus in (line.from_bus, line.to_bus)}
-    head = next(bus for bus in outwards(feeder) if bus in inside)
+    head = next(bus for bus in fed if bus in inside)
     distance, before = _ways(head, joined, ohm)
     end, what = _farthest(feeder, distance)
     path: list[Way] = []
@@ -104,8 +104,8 @@ def _longest_network(
     seen: set[str] = set()
     best: tuple[bool, float] = (False, 0.0)
     found: dict[str, Line] = {}
-    for root in joined:
-        if root in seen or root not in volts:
+    for root, v in volts.items():
+        if root in seen or root not in joined:
             continue
         buses, waiting = {root}, deque([root])
         while waiting:
@@ -117,7 +117,7 @@ def _longest_network(
         own = {
             part.name: part for bus in buses for _, part in joined[bus] if isinstance(part, Line)
         }
-        is_medium = MEDIUM_KV[0] < volts[root] * ROOT / 1000.0 <= MEDIUM_KV[1]
+        is_medium = MEDIUM_KV[0] < v * ROOT / 1000.0 <= MEDIUM_KV[1]
         rank = (is_medium, sum(line.length_km for line in own.values()))
         if own and rank > best:
             best, found = rank, {line.name: line for line in feeder.lines if line.name in own}
