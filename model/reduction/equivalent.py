@@ -1,0 +1,212 @@
+"""One bus that stands for all that is folded at a root: its loads, and the way there.
+
+With loads at level x, branch admittances y_j and the series impedances between, the root sees
+Y(x) = x sum(y_j) - x^2 (...) + ...; a single impedance Z before the sum of loads gives
+B - B Z B + ..., so that one Z can carry the whole second order of a uniform level. Loads are
+corrected so that each one's own factor has the right effect at the level of the fold, and Z
+makes the total there exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .primitives import branches_of
+
+__all__ = ["Equivalent", "Fit", "Kind", "across", "equivalent_of", "is_physical", "seen_through"]
+
+Complex = NDArray[np.complex128]
+Kind = Literal["bus", "line", "units"]
+
+ROUNDS = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """How a load stands at the equivalent's bus: between which phases, and how much of it."""
+
+    phases: str
+    connection: Literal["wye", "delta"]
+    share: complex  #: its admittance there, per branch, over that of a branch of its own
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Equivalent:
+    """Loads at the root ("bus"), or beyond a line or single-phase transformers ("units")."""
+
+    kind: Kind
+    z_ohm: Complex  #: (3, 3) between the root and the loads; 0 for "bus"
+    near_s: Complex  #: (3, 3) to earth at the root
+    far_s: Complex  #: (3, 3) to earth at the loads
+    fits: tuple[Fit, ...]
+    stub_gain: Complex  #: (3, 3) voltage at the loads per voltage at the root, at the fold's level
+
+
+def equivalent_of(
+    kind: Kind,
+    level: float,
+    seen_s: tuple[Complex, Complex],
+    loads: Sequence[tuple[complex, Complex]],
+) -> Equivalent:
+    """Fit an equivalent of one kind.
+
+    Parameters
+    ----------
+    kind : Kind
+    level : float
+        Of all loads, at which the fold is exact.
+    seen_s : two (3, 3) arrays
+        What the root sees at that level, and without loads.
+    loads : sequence
+        Of each load the admittance of a branch at level 1, and the (branches, 3) voltages of
+        its branches per voltage of the root's phases.
+    """
+    whole, bare = seen_s
+    near, far = _shunts(kind, bare)
+    z = np.zeros((3, 3), np.complex128)
+    b = np.zeros((3, 3), np.complex128)
+    fits: list[Fit] = []
+    for _ in range(ROUNDS):
+        forward = np.eye(3) + (b + far) @ z
+        fits = [_fit(gain @ forward.T) for _, gain in loads]
+        b = _loaded(level, fits, loads)
+        if kind == "bus":
+            factor = _projection(whole, b)
+            fits = [
+                Fit(phases=f.phases, connection=f.connection, share=f.share * factor) for f in fits
+            ]
+            b = b * factor
+            break
+        # with a larger Z the loads grow twice as much as it takes away: a step against the gap
+        z = 2.0 * z - _series(kind, whole - near, b + far, _loaded(level, fits, loads, np.abs))
+    gain = np.linalg.inv(np.eye(3) + z @ (b + far))
+    return Equivalent(kind=kind, z_ohm=z, near_s=near, far_s=far, fits=tuple(fits), stub_gain=gain)
+
+
+def is_physical(equivalent: Equivalent) -> bool:
+    """Whether a line or a transformer can have this impedance: a rest of rounding may not."""
+    z = equivalent.z_ohm.diagonal()
+    there = z != 0.0
+    passive = (z.real >= 0.0) & (z.imag > 0.0)
+    return equivalent.kind == "bus" or bool(there.any() and np.all(passive | ~there))
+
+
+def seen_through(
+    equivalent: Equivalent, level: float, loads: Sequence[tuple[complex, Complex]]
+) -> Complex:
+    """(3, 3) what a root sees of its equivalent with linear loads, all at ``level``."""
+    b = _loaded(level, equivalent.fits, loads) + equivalent.far_s
+    inverse = np.linalg.inv(np.eye(3) + b @ equivalent.z_ohm)
+    return np.asarray(equivalent.near_s + inverse @ b)
+
+
+def _shunts(kind: Kind, bare: Complex) -> tuple[Complex, Complex]:
+    """What is there without loads: half of the charging at either end, or magnetizing beyond."""
+    nothing = np.zeros((3, 3), np.complex128)
+    if kind == "line":
+        charging = 0.5j * _capacitive(bare)
+        return charging, charging
+    if kind == "units":
+        g = np.maximum(bare.diagonal().real, 0.0)
+        return nothing, np.diag(g + 1j * np.minimum(bare.diagonal().imag, 0.0))
+    return nothing, nothing
+
+
+def _capacitive(bare: Complex) -> NDArray[np.float64]:
+    """Susceptances that a line's capacitances can have: none negative from a phase to earth."""
+    b = (bare.imag + bare.imag.T) / 2.0
+    between = np.minimum(b - np.diag(b.diagonal()), 0.0)
+    return np.asarray(between + np.diag(np.maximum(b.diagonal(), -between.sum(axis=1))))
+
+
+def _unit_shapes() -> list[tuple[str, Literal["wye", "delta"], Complex]]:
+    """All ways a load may stand at a bus, with the sum of its branches' outer products."""
+    shapes: list[tuple[str, Literal["wye", "delta"]]] = [
+        ("".join(some), "wye") for count in (1, 2, 3) for some in combinations("abc", count)
+    ]
+    shapes += [("ab", "delta"), ("bc", "delta"), ("ca", "delta"), ("abc", "delta")]
+    found = []
+    for phases, connection in shapes:
+        total = np.zeros((3, 3), np.complex128)
+        for branch in across(phases, connection):
+            total += np.outer(branch, branch)
+        found.append((phases, connection, total))
+    return found
+
+
+def across(phases: str, connection: str) -> NDArray[np.float64]:
+    """(branches, 3) voltage of each branch per voltage of the phases."""
+    rows = np.zeros((0, 3))
+    for start, end in branches_of(phases, connection):
+        branch = np.zeros(3)
+        branch[start] = 1.0
+        if end >= 0:
+            branch[end] = -1.0
+        rows = np.vstack([rows, branch])
+    return rows
+
+
+SHAPES = _unit_shapes()
+
+
+def _fit(gain: Complex) -> Fit:
+    """The way to stand at a bus that comes nearest to a load with these voltage gains."""
+    wanted = gain.T @ gain
+    best, least = None, np.inf
+    for phases, connection, shape in SHAPES:
+        share = _projection(wanted, shape)
+        left = float(np.abs(wanted - share * shape).sum())
+        if left < least * (1.0 - 1e-9):
+            best, least = Fit(phases=phases, connection=connection, share=share), left
+    assert best is not None
+    return best
+
+
+def _projection(wanted: Complex, shape: Complex) -> complex:
+    """The factor that brings ``shape`` nearest to ``wanted``."""
+    return complex(np.vdot(shape, wanted) / np.vdot(shape, shape))
+
+
+def _loaded(
+    level: float,
+    fits: Sequence[Fit],
+    loads: Sequence[tuple[complex, Complex]],
+    measure: Callable[[complex], complex] = complex,
+) -> Complex:
+    """(3, 3) admittance of all loads at the equivalent's bus, or the sum of their ``measure``."""
+    total = np.zeros((3, 3), np.complex128)
+    for fit, (y, _) in zip(fits, loads, strict=True):
+        total += measure(level * fit.share * y) * _SHAPE[fit.phases, fit.connection]
+    return total
+
+
+_SHAPE = {(phases, connection): shape for phases, connection, shape in SHAPES}
+
+
+def _series(kind: Kind, whole: Complex, beyond: Complex, loads: Complex) -> Complex:
+    """(3, 3) the impedance before ``beyond`` that makes it look like ``whole``, where loads are."""
+    there = np.abs(loads).sum(axis=1) > 0.0
+    _, sizes, vectors = np.linalg.svd(loads.real)
+    basis = vectors[sizes > 1e-6 * sizes.max(initial=0.0)].T
+    z = np.linalg.inv(basis.T @ whole @ basis) - np.linalg.inv(basis.T @ beyond @ basis)
+    z = (z + z.T) / 2.0
+    if kind == "units":
+        return _diagonal(z, basis, there)
+    full = basis @ z @ basis.T
+    rest = np.diag(there.astype(float)) - basis @ basis.T
+    return np.asarray(full + np.trace(z) / len(z) * rest)
+
+
+def _diagonal(z: Complex, basis: NDArray[np.float64], there: NDArray[np.bool_]) -> Complex:
+    """Impedances of the phases alone that come nearest to ``z`` in the directions of ``basis``."""
+    columns = np.array([np.outer(row, row).ravel() for row in basis[there]]).T
+    values, *_ = np.linalg.lstsq(columns.astype(np.complex128), z.ravel(), rcond=None)
+    found = np.zeros(3, np.complex128)
+    found[there] = values
+    return np.diag(found)
