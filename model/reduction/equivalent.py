@@ -1,16 +1,16 @@
 """One bus that stands for all that is folded at a root: its loads, and the way there.
 
-With loads at level x, branch admittances y_j and the series impedances between, the root sees
-Y(x) = x sum(y_j) - x^2 (...) + ...; a single impedance Z before the sum of loads gives
-B - B Z B + ..., so that one Z can carry the whole second order of a uniform level. Loads are
-corrected so that each one's own factor has the right effect at the level of the fold, and Z
-makes the total there exact.
+With branch admittances y_j at level x and the series impedances between, the root sees
+x sum(y_j) less a part that grows with x squared. A single impedance Z before a sum B of loads gives
+B - B Z B + ...: so each load is what it is without the others' drop, Z carries the second order,
+and is such that the total is exact at the level of the fold.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from itertools import combinations
 from typing import Literal
 
@@ -19,12 +19,19 @@ from numpy.typing import NDArray
 
 from .primitives import branches_of
 
-__all__ = ["Equivalent", "Fit", "Kind", "across", "equivalent_of", "is_physical", "seen_through"]
+__all__ = [
+    "Equivalent",
+    "Fit",
+    "Kind",
+    "SeenLoad",
+    "across",
+    "equivalent_of",
+    "is_physical",
+    "seen_through",
+]
 
 Complex = NDArray[np.complex128]
 Kind = Literal["bus", "line", "units"]
-
-ROUNDS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,11 +55,17 @@ class Equivalent:
     stub_gain: Complex  #: (3, 3) voltage at the loads per voltage at the root, at the fold's level
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SeenLoad:
+    """A load that is folded: (branches, 3) voltages of its branches per voltage at the root."""
+
+    y_s: complex  #: of a branch, at level 1
+    gain: Complex  #: at the level of the fold
+    bare_gain: Complex  #: without loads
+
+
 def equivalent_of(
-    kind: Kind,
-    level: float,
-    seen_s: tuple[Complex, Complex],
-    loads: Sequence[tuple[complex, Complex]],
+    kind: Kind, level: float, whole_s: Complex, bare_s: Complex, loads: Sequence[SeenLoad]
 ) -> Equivalent:
     """Fit an equivalent of one kind.
 
@@ -61,45 +74,45 @@ def equivalent_of(
     kind : Kind
     level : float
         Of all loads, at which the fold is exact.
-    seen_s : two (3, 3) arrays
+    whole_s, bare_s : (3, 3) arrays
         What the root sees at that level, and without loads.
-    loads : sequence
-        Of each load the admittance of a branch at level 1, and the (branches, 3) voltages of
-        its branches per voltage of the root's phases.
+    loads : sequence of SeenLoad
     """
-    whole, bare = seen_s
-    near, far = _shunts(kind, bare)
-    z = np.zeros((3, 3), np.complex128)
-    b = np.zeros((3, 3), np.complex128)
-    fits: list[Fit] = []
-    for _ in range(ROUNDS):
-        forward = np.eye(3) + (b + far) @ z
-        fits = [_fit(gain @ forward.T) for _, gain in loads]
-        b = _loaded(level, fits, loads)
-        if kind == "bus":
-            factor = _projection(whole, b)
-            fits = [
-                Fit(phases=f.phases, connection=f.connection, share=f.share * factor) for f in fits
-            ]
-            b = b * factor
-            break
-        # with a larger Z the loads grow twice as much as it takes away: a step against the gap
-        z = 2.0 * z - _series(kind, whole - near, b + far, _loaded(level, fits, loads, np.abs))
-    gain = np.linalg.inv(np.eye(3) + z @ (b + far))
-    return Equivalent(kind=kind, z_ohm=z, near_s=near, far_s=far, fits=tuple(fits), stub_gain=gain)
+    if kind == "bus":
+        return _at_the_root(level, whole_s, loads)
+    near, far = _shunts(kind, bare_s)
+    fits = tuple(_fit(load.bare_gain) for load in loads)
+    b = _loaded(level, fits, loads) + far
+    z = _series(kind, whole_s - near, b, _loaded(level, fits, loads, np.abs))
+    gain = np.asarray(np.linalg.inv(np.eye(3) + z @ b), np.complex128)
+    return Equivalent(kind=kind, z_ohm=z, near_s=near, far_s=far, fits=fits, stub_gain=gain)
+
+
+def _at_the_root(level: float, whole_s: Complex, loads: Sequence[SeenLoad]) -> Equivalent:
+    """Every load by its effect at the level of the fold, and a factor for the total."""
+    nothing = np.zeros((3, 3), np.complex128)
+    fits = [_fit(load.gain) for load in loads]
+    b = _loaded(level, fits, loads)
+    factor = _projection(whole_s, b) if loads else 1.0
+    return Equivalent(
+        kind="bus",
+        z_ohm=nothing,
+        near_s=nothing,
+        far_s=nothing,
+        fits=tuple(replace(fit, share=fit.share * factor) for fit in fits),
+        stub_gain=np.eye(3, dtype=np.complex128),
+    )
 
 
 def is_physical(equivalent: Equivalent) -> bool:
     """Whether a line or a transformer can have this impedance: a rest of rounding may not."""
     z = equivalent.z_ohm.diagonal()
     there = z != 0.0
-    passive = (z.real >= 0.0) & (z.imag > 0.0)
+    passive = (z.real >= 0.0) & (z.imag >= 0.0)
     return equivalent.kind == "bus" or bool(there.any() and np.all(passive | ~there))
 
 
-def seen_through(
-    equivalent: Equivalent, level: float, loads: Sequence[tuple[complex, Complex]]
-) -> Complex:
+def seen_through(equivalent: Equivalent, level: float, loads: Sequence[SeenLoad]) -> Complex:
     """(3, 3) what a root sees of its equivalent with linear loads, all at ``level``."""
     b = _loaded(level, equivalent.fits, loads) + equivalent.far_s
     inverse = np.linalg.inv(np.eye(3) + b @ equivalent.z_ohm)
@@ -110,11 +123,11 @@ def _shunts(kind: Kind, bare: Complex) -> tuple[Complex, Complex]:
     """What is there without loads: half of the charging at either end, or magnetizing beyond."""
     nothing = np.zeros((3, 3), np.complex128)
     if kind == "line":
-        charging = 0.5j * _capacitive(bare)
+        charging = np.asarray(0.5j * _capacitive(bare), np.complex128)
         return charging, charging
     if kind == "units":
         g = np.maximum(bare.diagonal().real, 0.0)
-        return nothing, np.diag(g + 1j * np.minimum(bare.diagonal().imag, 0.0))
+        return nothing, _diagonal_of(g + 1j * np.minimum(bare.diagonal().imag, 0.0))
     return nothing, nothing
 
 
@@ -140,6 +153,7 @@ def _unit_shapes() -> list[tuple[str, Literal["wye", "delta"], Complex]]:
     return found
 
 
+@cache
 def across(phases: str, connection: str) -> NDArray[np.float64]:
     """(branches, 3) voltage of each branch per voltage of the phases."""
     rows = np.zeros((0, 3))
@@ -176,13 +190,13 @@ def _projection(wanted: Complex, shape: Complex) -> complex:
 def _loaded(
     level: float,
     fits: Sequence[Fit],
-    loads: Sequence[tuple[complex, Complex]],
+    loads: Sequence[SeenLoad],
     measure: Callable[[complex], complex] = complex,
 ) -> Complex:
     """(3, 3) admittance of all loads at the equivalent's bus, or the sum of their ``measure``."""
     total = np.zeros((3, 3), np.complex128)
-    for fit, (y, _) in zip(fits, loads, strict=True):
-        total += measure(level * fit.share * y) * _SHAPE[fit.phases, fit.connection]
+    for fit, load in zip(fits, loads, strict=True):
+        total += measure(level * fit.share * load.y_s) * _SHAPE[fit.phases, fit.connection]
     return total
 
 
@@ -209,4 +223,8 @@ def _diagonal(z: Complex, basis: NDArray[np.float64], there: NDArray[np.bool_]) 
     values, *_ = np.linalg.lstsq(columns.astype(np.complex128), z.ravel(), rcond=None)
     found = np.zeros(3, np.complex128)
     found[there] = values
-    return np.diag(found)
+    return _diagonal_of(found)
+
+
+def _diagonal_of(values: Complex) -> Complex:
+    return np.asarray(np.diag(values), np.complex128)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..buses import bus_volts
 from ..parts import Feeder, InlineTransformer, Line, Load
-from .equivalent import Equivalent, Kind, equivalent_of, is_physical, seen_through
+from .equivalent import Equivalent, Kind, SeenLoad, equivalent_of, is_physical, seen_through
 from .foldable import fold_roots, kept_by_default
 from .folded_part import FoldedPart, Seen, folded_part, seen_from_roots
 from .rebuild import Stub, free_name, moved_load, names_in, stub_of
@@ -82,6 +82,9 @@ def fold(
     """
     volts = bus_volts(feeder)
     root_of = fold_roots(feeder, kept_by_default(feeder) | set(keep))
+    if not root_of:
+        nothing = dict.fromkeys(("buses_before", "buses_after"), len(volts))
+        return Folded(feeder=feeder, **nothing, level=level, roots=(), kept=frozenset(volts))
     part = folded_part(feeder, root_of)
     root_v = _root_volts(part, volts)
     own = _rows_of_loads(part)
@@ -116,7 +119,8 @@ def fold(
 def _root_volts(part: FoldedPart, volts: Mapping[str, float]) -> Complex:
     """(R, 3) nominal voltages of the roots."""
     turn = np.exp(-2j * np.pi / 3.0 * np.arange(3))
-    return np.array([volts[root] for root in part.roots])[:, None] * turn
+    size = np.array([volts[root] for root in part.roots])
+    return np.asarray(size[:, None] * turn, np.complex128)
 
 
 def _rows_of_loads(part: FoldedPart) -> list[list[NDArray[np.int64]]]:
@@ -149,16 +153,17 @@ def _choose(
     own: list[list[NDArray[np.int64]]],
 ) -> list[tuple[Equivalent, float]]:
     """Of each root the first equivalent that is near enough or else the nearest; its misfit."""
-    bare = seen_from_roots(part, root_v, 0.0).y_s
+    bare = seen_from_roots(part, root_v, 0.0)
     truth = [seen_from_roots(part, root_v, at, state.branch_y_s).y_s for at in ENDS]
     found: list[tuple[Equivalent, float]] = []
     for n, rows in enumerate(own):
-        loads = [(_mean_y(state, k), state.gain[k]) for k in rows]
+        loads = [
+            SeenLoad(y_s=_mean_y(state, k), gain=state.gain[k], bare_gain=bare.gain[k])
+            for k in rows
+        ]
         tried: list[tuple[Equivalent, float]] = []
-        for kind in how.kinds:
-            if not loads and kind != "bus":
-                continue
-            equivalent = equivalent_of(kind, how.level, (state.y_s[n], bare[n]), loads)
+        for kind in how.kinds if loads else ("bus",):
+            equivalent = equivalent_of(kind, how.level, state.y_s[n], bare.y_s[n], loads)
             if not is_physical(equivalent):
                 continue
             off = max(
@@ -168,6 +173,10 @@ def _choose(
             tried.append((equivalent, off))
             if off <= how.within:
                 break
+        if not tried:
+            tried.append(
+                (equivalent_of("bus", how.level, state.y_s[n], bare.y_s[n], loads), np.inf)
+            )
         found.append(min(tried, key=lambda pair: pair[1]))
     return found
 
@@ -187,10 +196,10 @@ def _accounts(
     buses, loads = Counter(root_of.values()), Counter[str]()
     kw, km = defaultdict[str, float](float), defaultdict[str, float](float)
     for load in feeder.loads:
-        bus = load.place.bus if load.place is not None else None
-        if bus in root_of:
-            loads[root_of[bus]] += 1
-            kw[root_of[bus]] += load.kw
+        root = root_of.get(load.place.bus or "") if load.place is not None else None
+        if root is not None:
+            loads[root] += 1
+            kw[root] += load.kw
     for line in feeder.lines:
         root = root_of.get(line.from_bus) or root_of.get(line.to_bus)
         if root is not None and volts[line.from_bus] == volts[root]:

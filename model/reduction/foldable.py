@@ -6,13 +6,23 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
 from ..buses import bus_phases, bus_volts
-from ..parts import Feeder, InlineTransformer, Place
+from ..parts import (
+    Capacitor,
+    Feeder,
+    InlineTransformer,
+    Line,
+    Place,
+    Regulator,
+    Switch,
+    Transformer,
+)
 
 __all__ = ["fold_roots", "kept_by_default"]
 
 LOW_VOLTAGE_V = 1000.0 / 3.0**0.5
 """Nominal phase-to-earth voltage up to which a bus is low voltage."""
 
+_Ended = Line | Switch | Regulator | InlineTransformer
 _Graph = dict[str, list[tuple[str, int]]]
 
 
@@ -29,7 +39,8 @@ def kept_by_default(feeder: Feeder) -> set[str]:
     kept = {bus for bus, mask in phases.items() if mask == 0b111 and bus not in low}
     kept.add(feeder.source.bus)
     ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
-    for part in (*feeder.switches, *feeder.regulators, *_three_phase(feeder)):
+    acted_on: list[_Ended] = [*feeder.switches, *feeder.regulators, *_three_phase(feeder)]
+    for part in acted_on:
         kept |= {part.from_bus, part.to_bus}
     for point in feeder.points:
         kept |= {point.bus, *ends[point.line]}
@@ -54,7 +65,8 @@ def _three_phase(feeder: Feeder) -> Iterator[InlineTransformer]:
 
 def _places(feeder: Feeder) -> Iterator[Place]:
     """Where parts stand that are kept, and loads that stand on a line."""
-    for part in (*feeder.transformers, *feeder.capacitors):
+    placed: list[Transformer | Capacitor] = [*feeder.transformers, *feeder.capacitors]
+    for part in placed:
         yield part.place
     for der in feeder.ders:
         if der.place is not None:
@@ -92,7 +104,12 @@ def fold_roots(feeder: Feeder, kept: Iterable[str]) -> dict[str, str]:
 
 def _graph(feeder: Feeder) -> _Graph:
     joined: defaultdict[str, list[tuple[str, int]]] = defaultdict(list)
-    parts = (*feeder.lines, *feeder.switches, *feeder.regulators, *feeder.inline_transformers)
+    parts: list[_Ended] = [
+        *feeder.lines,
+        *feeder.switches,
+        *feeder.regulators,
+        *feeder.inline_transformers,
+    ]
     for index, part in enumerate(parts):
         joined[part.from_bus].append((part.to_bus, index))
         joined[part.to_bus].append((part.from_bus, index))

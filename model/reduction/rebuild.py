@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..parts import Feeder, InlineTransformer, Line, LineCode, Load, Place
+from ..parts import Feeder, InlineTransformer, Line, LineCode, Load, Place, Regulator, Switch
 from .equivalent import Equivalent, Fit, across
 from .primitives import law_factors
 
@@ -144,9 +144,14 @@ def _as_rows(matrix: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 
 def names_in(feeder: Feeder) -> set[str]:
     """All names of a feeder that those of new parts must differ from."""
-    ended = (*feeder.lines, *feeder.inline_transformers, *feeder.regulators, *feeder.switches)
+    ended: list[Line | Switch | Regulator | InlineTransformer] = [
+        *feeder.lines,
+        *feeder.switches,
+        *feeder.regulators,
+        *feeder.inline_transformers,
+    ]
     taken = {name for part in ended for name in (part.name, part.from_bus, part.to_bus)}
-    return taken | {part.name for part in (*feeder.codes, *feeder.transformers)}
+    return taken | {code.name for code in feeder.codes} | {t.name for t in feeder.transformers}
 
 
 def free_name(root: str, taken: Container[str]) -> str:
