@@ -26,12 +26,14 @@ __all__ = [
     "SeenLoad",
     "across",
     "equivalent_of",
-    "is_physical",
     "seen_through",
 ]
 
 Complex = NDArray[np.complex128]
 Kind = Literal["bus", "line", "units"]
+
+LEAST_Z = 1e-6
+"""Least impedance of an equivalent, as a share of that of its loads."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +85,8 @@ def equivalent_of(
     near, far = _shunts(kind, bare_s)
     fits = tuple(_fit(load.bare_gain) for load in loads)
     b = _loaded(level, fits, loads) + far
-    z = _series(kind, whole_s - near, b, _loaded(level, fits, loads, np.abs))
+    size = _loaded(level, fits, loads, np.abs)
+    z = _passive(_series(kind, whole_s - near, b, size), size)
     gain = np.asarray(np.linalg.inv(np.eye(3) + z @ b), np.complex128)
     return Equivalent(kind=kind, z_ohm=z, near_s=near, far_s=far, fits=fits, stub_gain=gain)
 
@@ -102,14 +105,6 @@ def _at_the_root(level: float, whole_s: Complex, loads: Sequence[SeenLoad]) -> E
         fits=tuple(replace(fit, share=fit.share * factor) for fit in fits),
         stub_gain=np.eye(3, dtype=np.complex128),
     )
-
-
-def is_physical(equivalent: Equivalent) -> bool:
-    """Whether a line or a transformer can have this impedance: a rest of rounding may not."""
-    z = equivalent.z_ohm.diagonal()
-    there = z != 0.0
-    passive = (z.real >= 0.0) & (z.imag >= 0.0)
-    return equivalent.kind == "bus" or bool(there.any() and np.all(passive | ~there))
 
 
 def seen_through(equivalent: Equivalent, level: float, loads: Sequence[SeenLoad]) -> Complex:
@@ -215,6 +210,17 @@ def _series(kind: Kind, whole: Complex, beyond: Complex, loads: Complex) -> Comp
     full = basis @ z @ basis.T
     rest = np.diag(there.astype(float)) - basis @ basis.T
     return np.asarray(full + np.trace(z) / len(z) * rest)
+
+
+def _passive(z: Complex, loads: Complex) -> Complex:
+    """The impedance, or one that a line can have: where it is next to nothing, rounding rules."""
+    own = z.diagonal()
+    there = np.abs(loads).sum(axis=1) > 0.0
+    if np.all(~there | ((own.real >= 0.0) & (own.imag > 0.0))):
+        return z
+    least = LEAST_Z / np.abs(loads).max()
+    values = np.maximum(own.real, 0.0) + 1j * np.maximum(own.imag, least)
+    return _diagonal_of(np.where(there, values, 0.0))
 
 
 def _diagonal(z: Complex, basis: NDArray[np.float64], there: NDArray[np.bool_]) -> Complex:

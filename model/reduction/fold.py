@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..buses import bus_volts
 from ..parts import Feeder, InlineTransformer, Line, Load
-from .equivalent import Equivalent, Kind, SeenLoad, equivalent_of, is_physical, seen_through
+from .equivalent import Equivalent, Kind, SeenLoad, equivalent_of, seen_through
 from .foldable import fold_roots, kept_by_default
 from .folded_part import FoldedPart, Seen, folded_part, seen_from_roots
 from .rebuild import Stub, free_name, moved_load, names_in, stub_of
@@ -164,8 +164,6 @@ def _choose(
         tried: list[tuple[Equivalent, float]] = []
         for kind in how.kinds if loads else ("bus",):
             equivalent = equivalent_of(kind, how.level, state.y_s[n], bare.y_s[n], loads)
-            if not is_physical(equivalent):
-                continue
             off = max(
                 _gap(seen_through(equivalent, at, loads), y[n])
                 for at, y in zip(ENDS, truth, strict=True)
@@ -173,10 +171,6 @@ def _choose(
             tried.append((equivalent, off))
             if off <= how.within:
                 break
-        if not tried:
-            tried.append(
-                (equivalent_of("bus", how.level, state.y_s[n], bare.y_s[n], loads), np.inf)
-            )
         found.append(min(tried, key=lambda pair: pair[1]))
     return found
 

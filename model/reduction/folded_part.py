@@ -193,7 +193,8 @@ def _incidence(part: FoldedPart) -> Any:
 def _per_phase(part: FoldedPart) -> Complex:
     """(inside, 3) current from 1 V at one phase of every root: no branch has two roots."""
     choose = np.tile(np.eye(3), (len(part.roots), 1))
-    return np.asarray(part.towards @ choose, np.complex128)
+    current: Complex = part.towards @ choose
+    return current
 
 
 def _root_of_branch(part: FoldedPart) -> NDArray[np.int64]:

@@ -60,7 +60,7 @@ def moved_load(
         connection=fit.connection,
         phases=fit.phases,
         branch_kv=kv,
-        kw=max(kva.real, 0.0),
+        kw=max(kva.real, 0.0) if load.kw >= 0.0 else kva.real,
         kvar=kva.imag,
     )
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
+from .equivalent import Kind
 from .fold import ENDS, Folded
 from .measure import LEVEL_RANGE, OWN_RANGE, Measured, Spread
 
 __all__ = ["folded_json", "folded_text"]
 
-KINDS = {
+KINDS: dict[Kind, str] = {
     "bus": "as loads at the root itself",
     "line": "beyond one line each",
     "units": "beyond one single-phase unit per phase each",
