@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 Complex = NDArray[np.complex128]
-Kind = Literal["bus", "line", "units"]
+Kind = Literal["bus", "line", "units", "both"]
 
 LEAST_Z = 1e-6
 """Least impedance of an equivalent, as a share of that of its loads."""
@@ -47,7 +47,10 @@ class Fit:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Equivalent:
-    """Loads at the root ("bus"), or beyond a line or single-phase transformers ("units")."""
+    """Loads at the root ("bus"), or beyond a line, single-phase units, or first one then the other.
+
+    ``z_ohm`` is that of all on the way.
+    """
 
     kind: Kind
     z_ohm: Complex  #: (3, 3) between the root and the loads; 0 for "bus"
@@ -115,15 +118,15 @@ def seen_through(equivalent: Equivalent, level: float, loads: Sequence[SeenLoad]
 
 
 def _shunts(kind: Kind, bare: Complex) -> tuple[Complex, Complex]:
-    """What is there without loads: half of the charging at either end, or magnetizing beyond."""
-    nothing = np.zeros((3, 3), np.complex128)
+    """What is there without loads: half of the charging at either end, magnetizing beyond."""
+    half = np.zeros((3, 3), np.complex128)
+    if kind in ("line", "both"):
+        half = np.asarray(0.5j * _capacitive(bare), np.complex128)
     if kind == "line":
-        charging = np.asarray(0.5j * _capacitive(bare), np.complex128)
-        return charging, charging
-    if kind == "units":
-        g = np.maximum(bare.diagonal().real, 0.0)
-        return nothing, _diagonal_of(g + 1j * np.minimum(bare.diagonal().imag, 0.0))
-    return nothing, nothing
+        return half, half
+    left = (bare - 2.0 * half).diagonal()
+    iron = np.maximum(left.real, 0.0) + 1j * np.minimum(left.imag, 0.0)
+    return half, half + _diagonal_of(iron)
 
 
 def _capacitive(bare: Complex) -> NDArray[np.float64]:

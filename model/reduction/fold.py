@@ -28,6 +28,9 @@ WITHIN = 1e-3
 """A root gets an equivalent bus of its own where loads at the root would miss by more."""
 
 
+NEW_BUSES: Mapping[Kind, int] = {"bus": 0, "line": 1, "units": 1, "both": 2}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FoldedRoot:
     """What was folded at one bus, and what stands for it."""
@@ -39,6 +42,11 @@ class FoldedRoot:
     km: float  #: of lines at the root's own voltage
     kind: Kind
     misfit: float  #: of the root's admittance with linear loads, at the worse end of ``ENDS``
+
+    @property
+    def km_lost(self) -> float:
+        """Length on which nothing can break any more."""
+        return 0.0 if self.kind in ("line", "both") else self.km
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,7 +67,7 @@ def fold(
     keep: Iterable[str] = (),
     level: float = LEVEL,
     within: float = WITHIN,
-    kinds: Sequence[Kind] = ("bus", "line", "units"),
+    kinds: Sequence[Kind] = ("bus", "line", "units", "both"),
 ) -> Folded:
     """Fold laterals and low-voltage networks.
 
@@ -89,8 +97,10 @@ def fold(
     root_v = _root_volts(part, volts)
     own = _rows_of_loads(part)
     state = seen_from_roots(part, root_v, level)
-    chosen = _choose(_Choice(kinds=kinds, within=within, level=level), part, state, root_v, own)
-    accounts = _accounts(feeder, root_of, volts, chosen)
+    km = _km(feeder, root_of, volts)
+    how = _Choice(kinds=kinds, within=within, level=level, km=[km[root] for root in part.roots])
+    chosen = _choose(how, part, state, root_v, own)
+    accounts = _accounts(feeder, root_of, km, chosen)
     taken = names_in(feeder)
     stubs: list[Stub] = []
     moved: dict[str, Load] = {}
@@ -105,11 +115,10 @@ def fold(
             v_was = float(np.abs(state.branch_v[rows]).mean())
             there = (_mean_y(state, rows), v_was, float(part.branch_v[rows[0]]))
             moved[load.name] = moved_load(load, stubs[-1].bus, fit, there, stub_v)
-    new_buses = sum(stub.bus != account.root for stub, account in zip(stubs, accounts, strict=True))
     return Folded(
         feeder=_rebuilt(feeder, root_of, stubs, moved),
         buses_before=len(volts),
-        buses_after=len(volts) - len(root_of) + new_buses,
+        buses_after=len(volts) - len(root_of) + sum(NEW_BUSES[each.kind] for each in accounts),
         level=level,
         roots=tuple(accounts),
         kept=frozenset(set(volts) - set(root_of)),
@@ -143,6 +152,14 @@ class _Choice:
     kinds: Sequence[Kind]
     within: float
     level: float
+    km: Sequence[float]  #: of each root
+
+    def kinds_for(self, root: int, loads: int) -> list[Kind]:
+        """What may stand for the folded part: length stays length, where there is any."""
+        if not loads:
+            return ["bus"]
+        useless = "units" if self.km[root] > 0.0 else "both"
+        return [kind for kind in self.kinds if kind != useless]
 
 
 def _choose(
@@ -162,7 +179,7 @@ def _choose(
             for k in rows
         ]
         tried: list[tuple[Equivalent, float]] = []
-        for kind in how.kinds if loads else ("bus",):
+        for kind in how.kinds_for(n, len(loads)):
             equivalent = equivalent_of(kind, how.level, state.y_s[n], bare.y_s[n], loads)
             off = max(
                 _gap(seen_through(equivalent, at, loads), y[n])
@@ -180,24 +197,32 @@ def _gap(found: Complex, wanted: Complex) -> float:
     return float(np.linalg.norm(found - wanted)) / size if size else 0.0
 
 
+def _km(
+    feeder: Feeder, root_of: Mapping[str, str], volts: Mapping[str, float]
+) -> Mapping[str, float]:
+    """Length of the folded lines at each root's own voltage."""
+    km = defaultdict[str, float](float)
+    for line in feeder.lines:
+        root = root_of.get(line.from_bus) or root_of.get(line.to_bus)
+        if root is not None and volts[line.from_bus] == volts[root]:
+            km[root] += line.length_km
+    return km
+
+
 def _accounts(
     feeder: Feeder,
     root_of: Mapping[str, str],
-    volts: Mapping[str, float],
+    km: Mapping[str, float],
     chosen: Sequence[tuple[Equivalent, float]],
 ) -> list[FoldedRoot]:
     """What is folded at each root."""
     buses, loads = Counter(root_of.values()), Counter[str]()
-    kw, km = defaultdict[str, float](float), defaultdict[str, float](float)
+    kw = defaultdict[str, float](float)
     for load in feeder.loads:
         root = root_of.get(load.place.bus or "") if load.place is not None else None
         if root is not None:
             loads[root] += 1
             kw[root] += load.kw
-    for line in feeder.lines:
-        root = root_of.get(line.from_bus) or root_of.get(line.to_bus)
-        if root is not None and volts[line.from_bus] == volts[root]:
-            km[root] += line.length_km
     return [
         FoldedRoot(
             root=root,

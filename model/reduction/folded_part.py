@@ -198,7 +198,7 @@ def _per_phase(part: FoldedPart) -> Complex:
 
 
 def _root_of_branch(part: FoldedPart) -> NDArray[np.int64]:
-    return part.owner[part.branch_from]
+    return np.asarray(part.owner[part.branch_from])
 
 
 def _at_voltage(part: FoldedPart, v_pu: NDArray[np.float64]) -> Complex:
@@ -208,7 +208,8 @@ def _at_voltage(part: FoldedPart, v_pu: NDArray[np.float64]) -> Complex:
         for k, v in zip(part.branch_load.tolist(), v_pu.tolist(), strict=True)
     ]
     factors = np.array(laws).reshape(-1, 2)
-    return part.branch_y_s.real * factors[:, 0] + 1j * part.branch_y_s.imag * factors[:, 1]
+    y = part.branch_y_s
+    return np.asarray(y.real * factors[:, 0] + 1j * y.imag * factors[:, 1], np.complex128)
 
 
 def _from_roots(part: FoldedPart, unit: Complex) -> Complex:

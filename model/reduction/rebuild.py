@@ -20,14 +20,18 @@ Complex = NDArray[np.complex128]
 SHORTEST_KM = 1e-3
 
 
+UNITS_SHARE = 0.1
+"""Of the impedance on the way, where a line and units share it."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stub:
     """The way from a root to the bus where its folded loads stand."""
 
     bus: str
-    line: Line | None
-    code: LineCode | None
-    units: tuple[InlineTransformer, ...]
+    line: Line | None = None
+    code: LineCode | None = None
+    units: tuple[InlineTransformer, ...] = ()
 
 
 def moved_load(
@@ -86,20 +90,33 @@ def stub_of(
     frequency_hz : float
     """
     root, bus = ends
-    if equivalent.kind == "bus":
-        return Stub(bus=root, line=None, code=None, units=())
-    there = np.abs(equivalent.z_ohm.diagonal()) > 0.0
-    if equivalent.kind == "units":
-        return Stub(bus=bus, line=None, code=None, units=_units(bus, root, equivalent, rating))
-    rows = np.flatnonzero(there)
+    kind, z, iron = equivalent.kind, equivalent.z_ohm, equivalent.far_s - equivalent.near_s
+    if kind == "bus":
+        return Stub(bus=root)
+    if kind == "units":
+        return Stub(bus=bus, units=_units((root, bus), z, iron, rating))
+    if kind == "line":
+        line, code = _line(ends, z, equivalent.near_s, km, frequency_hz)
+        return Stub(bus=bus, line=line, code=code)
+    middle = f"{bus}.line"
+    leakage = UNITS_SHARE * np.diag(z.diagonal())
+    line, code = _line((root, middle), z - leakage, equivalent.near_s, km, frequency_hz)
+    return Stub(bus=bus, line=line, code=code, units=_units((middle, bus), leakage, iron, rating))
+
+
+def _line(
+    ends: tuple[str, str], z: Complex, half_s: Complex, km: float, frequency_hz: float
+) -> tuple[Line, LineCode]:
+    """A line of a code of its own, in the phases that have an impedance."""
+    root, bus = ends
+    rows = np.flatnonzero(z.diagonal() != 0.0)
     chosen = np.ix_(rows, rows)
     length = max(km, SHORTEST_KM)
-    z = equivalent.z_ohm[chosen] / length
-    nf = 2.0 * equivalent.near_s[chosen].imag / (math.tau * frequency_hz) * 1e9
+    nf = 2.0 * half_s[chosen].imag / (math.tau * frequency_hz) * 1e9
     code = LineCode(
         name=bus,
-        r_ohm_per_km=_as_rows(z.real),
-        x_ohm_per_km=_as_rows(z.imag),
+        r_ohm_per_km=_as_rows(z[chosen].real / length),
+        x_ohm_per_km=_as_rows(z[chosen].imag / length),
         c_nf_per_km=_as_rows(nf / length) if np.any(nf) else None,
     )
     line = Line(
@@ -110,13 +127,14 @@ def stub_of(
         phases="".join("abc"[row] for row in rows),
         code=bus,
     )
-    return Stub(bus=bus, line=line, code=code, units=())
+    return line, code
 
 
 def _units(
-    bus: str, root: str, equivalent: Equivalent, rating: tuple[float, float]
+    ends: tuple[str, str], z: Complex, iron: Complex, rating: tuple[float, float]
 ) -> tuple[InlineTransformer, ...]:
     """Single-phase transformers of ratio one, with their share of what the folded ones took."""
+    root, bus = ends
     kva, volts = rating
     base = volts**2 / (kva * 1000.0)
     return tuple(
@@ -128,13 +146,13 @@ def _units(
             rating_kva=kva,
             kv_from=volts / 1000.0,
             kv_to=volts / 1000.0,
-            leakage_pu=complex(equivalent.z_ohm[row, row] / base),
-            magnetizing_pu=complex(equivalent.far_s[row, row] * base),
+            leakage_pu=complex(z[row, row] / base),
+            magnetizing_pu=complex(iron[row, row] * base),
             phases=phase,
             to_phases=phase,
         )
         for row, phase in enumerate("abc")
-        if equivalent.z_ohm[row, row] != 0.0
+        if z[row, row] != 0.0
     )
 
 

@@ -14,7 +14,8 @@ __all__ = ["folded_json", "folded_text"]
 KINDS: dict[Kind, str] = {
     "bus": "as loads at the root itself",
     "line": "beyond one line each",
-    "units": "beyond one single-phase unit per phase each",
+    "units": "beyond single-phase units",
+    "both": "beyond a line and single-phase units",
 }
 
 
@@ -34,6 +35,10 @@ def folded_text(folded: Folded, measured: Measured | None = None) -> list[str]:
         lines.append(
             f"  admittance of a root at levels {ENDS[0]:g} and {ENDS[1]:g}:"
             f" off by at most {_pct(worst.misfit)} ('{worst.root}')"
+        )
+    if lost := sum(root.km_lost for root in roots):
+        lines.append(
+            f"  {lost:.2f} of {sum(r.km for r in roots):.2f} km folded have no breaks left"
         )
     if measured is not None:
         lines += _measured_text(measured)

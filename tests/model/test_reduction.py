@@ -193,11 +193,13 @@ def test_the_account_counts_what_is_gone():
     folded = fold(feeder)
     buses = {bus for each in folded.feeder.lines for bus in (each.from_bus, each.to_bus)}
     buses |= {unit.to_bus for unit in folded.feeder.inline_transformers}
+    km = sum(each.length_km for each in feeder.lines)
     assert folded.buses_before == 3 + 3 * 3 * 2 + 3
     assert folded.buses_after == len(buses)
     assert folded.kept == set(TRUNK)
     assert {root.root: root.buses for root in folded.roots} == {"t1": 18, "t2": 3}
     assert sum(root.loads for root in folded.roots) == len(feeder.loads) - 1
+    assert sum(each.length_km for each in folded.feeder.lines) == pytest.approx(km)
 
 
 def test_what_must_be_kept_is():
