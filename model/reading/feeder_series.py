@@ -49,6 +49,8 @@ def _determinant(code: LineCode) -> complex:
     """Determinant of R + jX, its rows and columns scaled to a diagonal of 1."""
     size = range(len(code.r_ohm_per_km))
     z = [[complex(code.r_ohm_per_km[i][j], code.x_ohm_per_km[i][j]) for j in size] for i in size]
+    if any(z[i][i] == 0 for i in size):
+        return 0j
     scaled = [[z[i][j] / (z[i][i] * z[j][j]) ** 0.5 for j in size] for i in size]
     if len(scaled) == 1:
         return scaled[0][0]

@@ -25,7 +25,7 @@ CODES: tuple[Field, ...] = (
         name="x_ohm_per_km",
         kind="matrix",
         unit="ohm/km",
-        above=0.0,
+        low=0.0,
         required=True,
         doc="Series reactance at the source's frequency.",
     ),
