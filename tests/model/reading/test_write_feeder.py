@@ -168,7 +168,8 @@ class Draw:
         phases = self.some(there, 2 if delta else 1)
         law = self.rng.choice(["exponent", "both", "zip"])
         kvar = self.maybe(self.rng.uniform(-50, 50))
-        shares = [self.rng.uniform(-1, 2) for _ in range(4)]
+        zp, ip, zq, iq = (self.rng.uniform(-1, 2) for _ in range(4))
+        shares = (zp, ip, 1 - zp - ip, zq, iq, 1 - zq - iq)
         return Load(
             name=f"load {n}",
             transformer=None,
@@ -182,12 +183,11 @@ class Draw:
             branch_kv=self.maybe(self.rng.uniform(0.1, 8)),
             kvar=kvar,
             exponent_q=self.rng.uniform(0, 4) if law == "both" else None,
-            zip=(*shares[:2], 1 - sum(shares[:2]), *shares[2:], 1 - sum(shares[2:]))
-            if law == "zip"
-            else None,
+            zip=shares if law == "zip" else None,
             v_min_pu=self.rng.choice([0.7, 0.8]),
             v_max_pu=self.maybe(1.05),
             v_low_pu=self.maybe(0.5),
+            edge_exponent=self.maybe(0.0),
         )
 
 
