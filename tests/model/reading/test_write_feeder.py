@@ -28,8 +28,10 @@ from openphase.model import (
     Transformer,
     dump_feeder,
     feeder_from_toml,
+    load_feeder,
     make_feeder,
     read_feeder,
+    shipped_feeders,
     write_feeder,
 )
 from openphase.model.parts import InlineConnection, Neutral
@@ -337,6 +339,13 @@ def test_tables_are_called_after_the_file_and_listed_in_it(tmp_path: Path) -> No
     assert "[[loads]]" not in text
     assert 'loads = "the-town.loads.csv"' in text
     assert "[[codes]]" in text
+
+
+@pytest.mark.parametrize("name", shipped_feeders())
+def test_shipped_feeders_read_back_from_tables(name: str, tmp_path: Path) -> None:
+    feeder = load_feeder(name)
+    write_feeder(feeder, tmp_path / "f.toml", tables=True)
+    assert read_feeder(tmp_path / "f.toml") == feeder
 
 
 def test_a_file_that_cannot_be_written(tmp_path: Path) -> None:
