@@ -60,7 +60,8 @@ def _determinant(matrix: list[list[complex]]) -> complex:
     if len(matrix) == 1:
         return matrix[0][0]
     minors = ([row[:j] + row[j + 1 :] for row in matrix[1:]] for j in range(len(matrix)))
-    return sum((-1) ** j * matrix[0][j] * _determinant(minor) for j, minor in enumerate(minors))
+    terms = (own * _determinant(minor) for own, minor in zip(matrix[0], minors, strict=True))
+    return sum((-term if j % 2 else term for j, term in enumerate(terms)), start=0j)
 
 
 def _check_build(line: Line, index: int, codes: Mapping[str, LineCode], own: OwnChecks) -> None:
