@@ -265,7 +265,7 @@ _STAND_INS: dict[Kind, object] = {
 def _stand_in(field: Field) -> object:
     if field.kind in ("numbers", "integers") and field.count is not None:
         return (0,) * field.count
-    return field.choices[0] if field.choices else _STAND_INS[field.kind]
+    return field.choices[0] if field.choices else _STAND_INS.get(field.kind)
 
 
 def _finite(value: object) -> float | None:
