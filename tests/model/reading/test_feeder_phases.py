@@ -251,7 +251,8 @@ def test_a_code_has_as_many_rows_as_the_line_has_phases(code: LineCode, phases: 
     "change",
     [
         {"x_ohm_per_km": ((0.8, 0.3), (0.31, 0.8))},
-        {"x_ohm_per_km": ((0.8, 0.3), (0.3, 0.0))},
+        {"x_ohm_per_km": ((0.8, 0.3), (0.3, -0.1))},
+        {"r_ohm_per_km": ((0.3, 0.0), (0.0, 0.0)), "x_ohm_per_km": ((0.8, 0.0), (0.0, 0.0))},
         {"r_ohm_per_km": ((0.3, 0.1), (0.1, -0.3))},
         {"r_ohm_per_km": ((0.3,),)},
         {"c_nf_per_km": ((9.0,),)},
