@@ -47,7 +47,11 @@ LINES: tuple[Field, ...] = (
         name="length_km", kind="number", unit="km", above=0.0, required=True, doc="Route length."
     ),
     replace(PHASES, doc="The conductors it has, in the order of its code's rows."),
-    Field(name="code", kind="name", doc="How it is built; or give `z1_ohm_per_km` and `z0_ohm_per_km`."),
+    Field(
+        name="code",
+        kind="name",
+        doc="How it is built; or give `z1_ohm_per_km` and `z0_ohm_per_km`.",
+    ),
     Field(
         name="z1_ohm_per_km",
         kind="impedance",
@@ -137,7 +141,7 @@ INLINE_TRANSFORMERS: tuple[Field, ...] = (
         unit="pu",
         high=1.0,
         required=True,
-        doc="Leakage, not 0; of `centre-tap` the from-winding's branch of the star, which may be 0.",
+        doc="Leakage, not 0; of `centre-tap` the from-winding's branch of the star, maybe 0.",
     ),
     Field(
         name="leg_leakage_pu",
