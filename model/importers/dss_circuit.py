@@ -72,6 +72,7 @@ def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) ->
         plants=tuple(_plant(kind, row) for kind in _PLANTS for row in rows_of(engine, kind)),
         guards=tuple(_guard(kind, row) for kind in _GUARDS for row in rows_of(engine, kind)),
         tap_controls=tuple(_tap_control(row) for row in rows_of(engine, "regcontrol")),
+        cap_controls=tuple(_name(row) for row in rows_of(engine, "capcontrol")),
         others=tuple(_other(kind, row) for kind in _UNREAD for row in rows_of(engine, kind)),
         disabled=0,
         coordinates=tuple((bus, x, y) for bus, (x, y) in coordinates.items()),

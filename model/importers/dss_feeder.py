@@ -142,6 +142,10 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
         for plant in circuit.plants
         for part in der_of(plant, live, build.buses, names, findings)
     ]
+    for control in circuit.tap_controls:
+        findings.add("regcontrol", control.name, "state kept", "taps stay as the file has them")
+    for name in circuit.cap_controls:
+        findings.add("capcontrol", name, "state kept", "steps stay as the file has them")
     for other in circuit.others:
         findings.add(other.kind, other.name, "refused", "a class that has no model")
     shunts = _shunts(build)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..network import compile_network
 from ..solve import solve, steady_state
-from ..states import NOT_CONVERGED, UNEARTHED
+from ..states import NOT_CONVERGED
 from .dss_engine import solved_volts, tell
 from .dss_feeder import Imported
+from .unearthed import unearthed_buses
 
 __all__ = ["Difference", "differences"]
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
 
 _MODES = ("snap", "direct")
 
@@ -25,8 +31,9 @@ _DEAD_PU = 1e-6
 class Difference:
     """Voltages of all nodes with one kind of loads: ours against OpenDSS's.
 
-    ``snap``: each load by its own law; ``direct``: each its nominal admittance. A bus whose
-    common mode nothing determines is compared between phases, and counted as floating.
+    ``snap``: each load by its own law; ``direct``: each its nominal admittance. Buses that
+    nothing but capacitance holds to earth are compared without their common mode, and counted
+    as floating: OpenDSS holds them by an admittance of its own.
     """
 
     mode: str
@@ -68,47 +75,62 @@ def _difference(imported: Imported, mode: str) -> Difference:
     if mode == "direct":
         state = state._replace(exponent=np.full_like(state.exponent, 2.0))
     answer = solve(network, state)
-    volts, opendss_converged = solved_volts(imported.engine, mode=mode)
-    unearthed = bool(int(answer.flags[0]) & UNEARTHED)
-    named: dict[str, list[tuple[int, complex]]] = {}
-    for (bus, node), value in volts.items():
-        if bus in imported.buses and node in (1, 2, 3):
-            named.setdefault(imported.buses[bus], []).append((node - 1, value))
-    largest, where = 0.0, ("", "")
-    counts = {"nodes": 0, "floating": 0, "dead": 0}
-    levels: list[float] = []
-    for bus, theirs in named.items():
-        k = network.node(bus)
-        there = [(p, v) for p, v in theirs if int(network.node_phases[k]) >> p & 1]
-        nominal = float(network.node_v[k])
-        ours = np.array([answer.v[k, p, 0] for p, _ in there])
-        wanted = np.array([v for _, v in there])
-        counts["nodes"] += len(there)
-        if not len(there):
+    theirs, opendss_converged = solved_volts(imported.engine, mode=mode)
+    floating = unearthed_buses(feeder)
+    rows: list[_Bus] = []
+    for name, nodes in _by_bus(theirs).items():
+        bus = imported.buses.get(name)
+        if bus is None:
             continue
-        gap = np.abs(ours - wanted) / nominal
-        if unearthed and len(there) > 1 and float(gap.max()) > _DEAD_PU:
-            apart = (ours - ours.mean()) - (wanted - wanted.mean())
-            spread = np.abs(apart) / nominal
-            if float(spread.max()) < 0.1 * float(gap.max()):
-                gap = spread
-                counts["floating"] += len(there)
-        dead = np.abs(wanted) / nominal < _DEAD_PU
-        counts["dead"] += int(dead.sum())
-        levels += [float(abs(v)) / nominal for v in ours[~dead]]
-        worst = int(np.argmax(gap))
-        if not float(gap[worst]) <= largest:
-            largest, where = float(gap[worst]), (bus, "abc"[there[worst][0]])
+        k = network.node(bus)
+        phases = [p for p in nodes if int(network.node_phases[k]) >> p & 1]
+        if phases:
+            nominal = float(network.node_v[k])
+            ours = np.array([answer.v[k, p, 0] for p in phases]) / nominal
+            wanted = np.array([nodes[p] for p in phases]) / nominal
+            rows.append(_Bus(bus, phases, ours, wanted, bus in floating))
+    worst = max(rows, key=_largest, default=None)
+    levels = np.abs(np.concatenate([row.ours for row in rows])) if rows else np.zeros(1)
+    alive = levels[levels > _DEAD_PU]
     return Difference(
         mode=mode,
-        largest_pu=largest,
-        bus=where[0],
-        phase=where[1],
-        nodes=counts["nodes"],
-        floating=counts["floating"],
-        dead=counts["dead"],
+        largest_pu=_largest(worst) if worst else 0.0,
+        bus=worst.name if worst else "",
+        phase="abc"[worst.phases[int(np.argmax(worst.gap))]] if worst else "",
+        nodes=len(levels),
+        floating=sum(len(row.phases) for row in rows if row.floating),
+        dead=len(levels) - len(alive),
         converged=not int(answer.flags[0]) & NOT_CONVERGED,
         opendss_converged=opendss_converged,
-        lowest_pu=min(levels, default=0.0),
-        highest_pu=max(levels, default=0.0),
+        lowest_pu=float(alive.min(initial=2.0)),
+        highest_pu=float(alive.max(initial=0.0)),
     )
+
+
+class _Bus(NamedTuple):
+    """One bus as both see it, in pu."""
+
+    name: str
+    phases: list[int]
+    ours: Complex
+    wanted: Complex
+    floating: bool
+
+    @property
+    def gap(self) -> Real:
+        """Difference of each phase; between phases where nothing determines the rest."""
+        gap = self.ours - self.wanted
+        return np.asarray(np.abs(gap - gap.mean() if self.floating else gap))
+
+
+def _largest(row: _Bus) -> float:
+    return float(row.gap.max())
+
+
+def _by_bus(volts: Mapping[tuple[str, int], complex]) -> dict[str, dict[int, complex]]:
+    """Return the voltages of each bus by phase, neutrals left out."""
+    found: dict[str, dict[int, complex]] = {}
+    for (bus, node), value in volts.items():
+        if node in (1, 2, 3):
+            found.setdefault(bus, {})[node - 1] = value
+    return found
