@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .dss_child import run_apart
 from .dss_circuit import read_circuit
-from .dss_engine import solved_volts, start, tell, version
+from .dss_engine import refusals_told, solved_volts, start, tell, version
 from .dss_records import RawCircuit
 from .dss_script import Script
 
@@ -53,12 +53,14 @@ def _read(request: tuple[Script, str]) -> tuple[RawCircuit, str]:
     """Compile and read: the child's side."""
     script, source = request
     engine = start(script.commands, source)
-    return read_circuit(engine, script.coordinates), version(engine)
+    with refusals_told(engine):
+        return read_circuit(engine, script.coordinates), version(engine)
 
 
 def _solve(request: tuple[Script, str, tuple[str, ...], tuple[str, ...]]) -> dict[str, Volts]:
     """Compile and solve: the child's side."""
     script, source, told, modes = request
     engine = start(script.commands, source)
-    tell(engine, told)
-    return {mode: solved_volts(engine, mode=mode) for mode in modes}
+    with refusals_told(engine):
+        tell(engine, told)
+        return {mode: solved_volts(engine, mode=mode) for mode in modes}

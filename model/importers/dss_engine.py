@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,17 @@ import numpy as np
 from ..errors import Fault, InputError, OpenPhaseError
 from .dss_script import Command
 
-__all__ = ["Engine", "Props", "count_of", "rows_of", "solved_volts", "start", "tell", "version"]
+__all__ = [
+    "Engine",
+    "Props",
+    "count_of",
+    "refusals_told",
+    "rows_of",
+    "solved_volts",
+    "start",
+    "tell",
+    "version",
+]
 
 Props = Mapping[str, Any]
 
@@ -58,8 +69,7 @@ def start(commands: Iterable[Command], source: str) -> Engine:
         try:
             context.Text.Command = command.text
         except dss.DSSException as error:
-            said = " ".join(str(error.args[-1]).split())[:300]
-            where, rule = command.text[:80], f"is not taken by OpenDSS: {said}"
+            where, rule = command.text[:80], f"is not taken by OpenDSS: {_said(error)}"
             faults.append(Fault(source=command.file, line=command.line, where=where, wanted=rule))
             if len(faults) >= _MOST_FAULTS:
                 break
@@ -72,6 +82,21 @@ def start(commands: Iterable[Command], source: str) -> Engine:
     return Engine(
         context=context, circuit=context.ActiveCircuit, source=source, refusal=dss.DSSException
     )
+
+
+@contextmanager
+def refusals_told(engine: Engine) -> Iterator[None]:
+    """Turn what the engine says against the circuit as a whole into an error of the input."""
+    try:
+        yield
+    except engine.refusal as error:
+        rule = f"is not taken by OpenDSS: {_said(error)}"
+        raise InputError.single(engine.source, "the circuit", None, rule) from None
+
+
+def _said(error: Exception) -> str:
+    """Return what the engine said, on one line."""
+    return " ".join(str(error.args[-1]).split())[:300]
 
 
 def rows_of(engine: Engine, kind: str, *, disabled: bool = False) -> list[Props]:
