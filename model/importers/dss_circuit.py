@@ -71,7 +71,9 @@ def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) ->
         lines=_lines(engine),
         transformers=_each(engine, "transformer", _transformer),
         loads=_each(engine, "load", _load),
-        capacitors=_each(engine, "capacitor", _capacitor),
+        capacitors=_each(
+            engine, "capacitor", partial(_capacitor, frequency_hz=float(solution.Frequency))
+        ),
         reactors=_each(engine, "reactor", partial(_reactor, engine)),
         plants=_each_of(engine, _PLANTS, _plant),
         guards=_each_of(engine, _GUARDS, _guard),
@@ -259,17 +261,21 @@ def _load(row: Props) -> RawLoad:
     )
 
 
-def _capacitor(row: Props) -> RawCapacitor:
+def _capacitor(row: Props, frequency_hz: float) -> RawCapacitor:
     phases = int(row["phases"])
     delta = str(row["conn"]).lower().startswith(("d", "l"))
+    kv = float(row["kv"])
+    branch_kv = kv / 3.0**0.5 if phases > 1 and not delta else kv
+    # microfarads are what counts: the engine makes them of kvar in its own way
+    kvar_of_uf = 2.0e-3 * math.pi * frequency_hz * branch_kv**2 * phases
     return RawCapacitor(
         name=_name(row),
         end=end_of(row["bus1"], phases, phases),
         far=end_of(row["bus2"] or "", phases, phases),
         phases=phases,
         delta=delta,
-        kv=float(row["kv"]),
-        kvar=tuple(float(value) for value in row["kvar"]),
+        kv=kv,
+        kvar=tuple(float(f"{kvar_of_uf * float(value):.12g}") for value in row["cuf"]),
         states=tuple(int(value) for value in row["states"]),
         damped=any(float(value) != 0.0 for key in ("r", "xl") for value in row[key]),
     )
