@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from oracles.dense import DenseSolution, NoSolutionError, NotConvergedError, solve_dense
 from oracles.dense import Event as DenseEvent
 from oracles.dense_inline import nominal_volts
+from oracles.dense_parts import rows
 from oracles.random_happenings import Happening, dense_event
 
 from openphase.model.events.base import apply_event
@@ -18,7 +19,7 @@ from openphase.model.network import Network, detached_end
 from openphase.model.parts import Feeder
 from openphase.model.solve import solve, steady_state
 from openphase.model.solver.breaks import DEAD, FLOATING
-from openphase.model.states import NOT_CONVERGED, Answer
+from openphase.model.states import NOT_CONVERGED, UNEARTHED, Answer, unit_voltages
 
 __all__ = ["TOLERANCE", "Case", "Outcome", "compare", "gap_pu", "outcomes"]
 
@@ -118,8 +119,14 @@ def winding_voltages(
 ) -> dict[str, NDArray[np.float64]]:
     """The ladder's voltages, as a start for the reference."""
     network = case.network
-    units = network.tree.load_unit
-    found = {name: answer.unit_v_pu[units[n], :3, 0] for n, name in enumerate(network.loads)}
+    units, tree = unit_voltages(answer, len(network.units)), network.tree
+    branches = answer.winding_v_pu[4 * (len(network.units) + 1) :, 0]
+    found = {
+        name: units[tree.load_unit[n], :3, 0]
+        if tree.load_unit[n] >= 0
+        else branches[_own_branches(case, n)]
+        for n, name in enumerate(network.loads)
+    }
     own = network.machines
     for m, unit in enumerate(own.unit):
         motors = own.motor_load.size
@@ -128,11 +135,23 @@ def winding_voltages(
             if m < motors
             else f"{own.ders[m - motors]}.der"
         )
-        found[name] = np.full(3, answer.unit_v_pu[unit, 3, 0])
+        found[name] = np.full(3, units[unit, 3, 0])
     for n, shunt in enumerate(event.shunts):
         if shunt.exponent != 2.0:
-            found[f"shunt {n}"] = answer.unit_v_pu[-1, [shunt.phase], 0]
+            found[f"shunt {n}"] = units[-1, [shunt.phase], 0]
     return found
+
+
+def _own_branches(case: Case, load: int) -> list[int]:
+    """Places of a direct load's branches, in the order that its phases have in the file."""
+    tree, phases = case.network.tree, rows(case.feeder.loads[load].phases)
+    ends = [{int(a), int(b)} for a, b in zip(tree.branch_from, tree.branch_to, strict=True)]
+    pairs = [{k, -1} for k in phases]
+    if case.feeder.loads[load].connection == "delta":
+        around = zip(phases, [*phases[1:], phases[0]], strict=True)
+        pairs = [{a, b} for a, b in around][: 1 if len(phases) == 2 else 3]
+    own = np.flatnonzero(tree.branch_load == load)
+    return [next(int(k) for k in own if ends[k] == pair) for pair in pairs]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,7 +173,7 @@ def compare(
     ladder found must be one as well: the reference, held at the ladder's voltages, must give
     them back.
     """
-    flagged = bool(answer.flags[0] & (DEAD | FLOATING))
+    flagged = bool(answer.flags[0] & (DEAD | FLOATING | UNEARTHED))
     try:
         oracle = solve_dense(case.feeder, case.closed, event, start=start, **state)
     except NoSolutionError:
@@ -189,7 +208,7 @@ def outcomes(case: Case) -> list[Outcome]:
     if before.how not in ("agree", "elsewhere"):
         return [before]
     second = carried_over(network, first, answer, second, event.der_factor)
-    answer = solve(network, second, start=answer.unit_v_pu)
+    answer = solve(network, second, start=answer.winding_v_pu)
     scale = {name: float(event.load_factor[n, 0]) for n, name in enumerate(network.loads)}
     state |= {"before": oracle, "load_scale": scale}
     return [before, compare(case, answer, case.event(after=True), oracle, **state)[0]]
