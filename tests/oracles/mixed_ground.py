@@ -33,6 +33,7 @@ class Zone:
     volts: float  #: phase to earth
     va: float
     earthed: bool  #: things may be connected to earth
+    solid: bool = True  #: and they are not the only ones that are
     legs: bool = False  #: behind a centre tap: its phases are opposite
     like: tuple[object, ...] = ()  #: zones that are alike have the same voltages
 

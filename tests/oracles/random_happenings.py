@@ -69,7 +69,12 @@ def random_happening(rng: np.random.Generator, feeder: Feeder, network: Network)
         ganged = feeder.source.neutral in ("petersen", "isolated")
         size = (len(network.regulators), 1 if ganged else 3, 1)
         taps = 1 + 0.00625 * rng.integers(-2, 3, size=size)
-        event = replace(event, tap_factor=np.broadcast_to(taps, (len(network.regulators), 3, 1)))
+        taps = np.broadcast_to(taps, (len(network.regulators), 3, 1)).copy()
+        for row, own in zip(taps, feeder.regulators, strict=True):
+            # the ladder's z_ohm stays as the file's taps make it
+            fixed = [own.z_ohm != 0 or phase not in own.phases for phase in "abc"]
+            row[fixed] = 1.0
+        event = replace(event, tap_factor=taps)
     if rng.random() < 0.25:
         what.add("loads")
         event = replace(event, load_factor=rng.uniform(0.0, 1.4, (len(network.loads), 1)))
