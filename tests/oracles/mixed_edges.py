@@ -150,7 +150,7 @@ def _regulator(ground: Ground, upper: Bus) -> None:
             phases=phases,
             reference=reference,
             z_ohm=polar(zone.ohm * float(rng.uniform(1e-3, 1e-2)), 80.0) if some else 0j,
-            jumper_ohm=complex(zone.ohm * 1e-4) if rng.random() < 0.5 else 0j,
+            jumper_ohm=complex(zone.ohm * 1e-4 * (rng.random() < 0.5) * (reference in "abc")),
             gang=gang,
         )
     )
