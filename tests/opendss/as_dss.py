@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 
 from openphase.model.buses import bus_volts
 from openphase.model.line_matrices import phase_rows, shunt_nf_per_km, z_ohm_per_km
-from openphase.model.parts import Capacitor, Feeder, InlineTransformer, Line, Load, Regulator
+from openphase.model.parts import (
+    Capacitor,
+    Feeder,
+    InlineTransformer,
+    Line,
+    LineCode,
+    Load,
+    Regulator,
+)
 
 __all__ = ["Cut", "as_dss", "joined_buses", "node_name"]
 
@@ -90,6 +98,7 @@ class _Writer:
 
     def __init__(self, feeder: Feeder, bus_of: Callable[[str], str]) -> None:
         self.feeder = feeder
+        self.codes: dict[str | None, LineCode] = {code.name: code for code in feeder.codes}
         self.bus_of = bus_of
         self.neutrals: Counter[str] = Counter()
 
@@ -149,8 +158,8 @@ class _Writer:
         rows = phase_rows(line.phases)
         grid = np.ix_(rows, rows)
         km = line.length_km * share
-        z = z_ohm_per_km(self.feeder, line)[grid] * km
-        c = shunt_nf_per_km(self.feeder, line)[grid] * km
+        z = z_ohm_per_km(line, self.codes.get(line.code))[grid] * km
+        c = shunt_nf_per_km(line, self.codes.get(line.code))[grid] * km
         return (
             f"new line.{name} phases={len(rows)} bus1={start} bus2={end} length=1 units=none "
             f"rmatrix={_matrix(z.real)} xmatrix={_matrix(z.imag)} cmatrix={_matrix(c)} "
