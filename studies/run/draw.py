@@ -21,6 +21,7 @@ from ..spec.correlations import draw_scalars
 from .cases import Case, Group, Wired, make_case, make_cases
 from .classes import DrawClass, Purpose
 from .draw_event import draw_event, draw_wiring
+from .load_levels import load_levels
 
 __all__ = [
     "BlockId",
@@ -127,7 +128,8 @@ def _draw_states(rng: np.random.Generator, case: Case, size: int) -> tuple[State
     study, network = case.study, case.network
     scalars = draw_scalars(rng, study, size)
     shape = (len(network.loads), size)
-    scale = scalars["loads.level"] * study.loads.each.draw(rng, shape)
+    level = load_levels(study, case.load_places, scalars)
+    scale = level * study.loads.each.draw(rng, shape)
     spread = rng.uniform(-study.loads.exponent_spread, study.loads.exponent_spread, shape)
     exponent = np.clip(scalars["loads.exponent"] + spread, 0.0, 2.0)
     source_change = scalars["ambient.source_pct"] / 100.0
