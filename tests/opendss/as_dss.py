@@ -25,6 +25,7 @@ from openphase.model.parts import (
     Load,
     Regulator,
 )
+from openphase.model.phases import conductors
 
 __all__ = ["Cut", "as_dss", "joined_buses", "node_name"]
 
@@ -198,8 +199,10 @@ class _Writer:
 
     def regulator(self, own: Regulator, volts: float) -> list[str]:
         """One transformer for each unit, 1 MVA, its leakage in ohms on the from-side."""
+        if own.reference == "next":
+            raise ValueError("a closed delta's series windings lie between two buses: not written")
         out = []
-        for phase in own.phases:
+        for phase in conductors(own):
             if phase == own.reference:
                 z = own.jumper_ohm or SMALL_OHM
                 start, end = self.at(own.from_bus, phase), self.at(own.to_bus, phase)
@@ -209,8 +212,6 @@ class _Writer:
                 )
                 continue
             reference = own.reference
-            if reference == "next":
-                reference = "bca"["abc".index(phase)]
             ends = phase if reference == "earth" else phase + reference
             earth = (0,) if reference == "earth" else ()
             kv = volts / 1000.0 * (1.0 if reference == "earth" else ROOT)

@@ -8,6 +8,7 @@ from opendss.as_dss import Cut
 
 from openphase.model.line_matrices import shunt_nf_per_km
 from openphase.model.parts import Feeder, InlineTransformer, LineCode
+from openphase.model.phases import conductors
 
 __all__ = ["floating_nodes"]
 
@@ -47,7 +48,7 @@ def floating_nodes(feeder: Feeder, cut: Cut | None = None) -> dict[Node, Hashabl
         for phase in switch.phases if switch.closed else "":
             sets.join((switch.from_bus, phase), (switch.to_bus, phase))
     for own in feeder.regulators:
-        for phase in own.phases:
+        for phase in conductors(own):
             sets.join((own.from_bus, phase), (own.to_bus, phase))
             _reference(sets, own.from_bus, phase, own.reference)
     for unit in feeder.inline_transformers:
