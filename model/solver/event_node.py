@@ -137,16 +137,19 @@ def descend_event(
 def climb_loose(
     tree: Tree, work: Work, k: int, y: Matrix, z: Matrix, carried: Flags, x_j: Vector
 ) -> int:
-    """Eliminate edge k, at whose lower end modes are loose; returns flags."""
+    """Eliminate edge k, at whose lower end modes are loose; returns flags.
+
+    An event below has its own slots, which are needed on the way down.
+    """
     start_at(work, k, y, x_j, carried)
     flags = free_modes(tree, k, work, carried)
     p, p_j = load(work.here, 1), load_vector(work.here_j, 1)
-    climb_series(work, 0, z, carried)
+    climb_series(work, 3, z, carried)
     end_at(work, k, carried)
-    store(work.f, k, product(p, load(work.event, 0)))
-    store_vector(work.h_j, k, plus(times(p, load_vector(work.event_j, 0)), p_j))
+    store(work.f, k, product(p, load(work.event, 3)))
+    store_vector(work.h_j, k, plus(times(p, load_vector(work.event_j, 3)), p_j))
     for c in range(carried.size):
         if carried[c]:
-            ahead = product(p, load(work.event_h[0], c))
+            ahead = product(p, load(work.event_h[3], c))
             store(work.h[k], c, add(ahead, load(work.here_h, c)))
     return flags
