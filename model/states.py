@@ -180,7 +180,7 @@ class Work(NamedTuple):
     here_x: Complex  #: (C, 3, 3) X
     here_h: Complex  #: (C, 3, 3) H
     row: Complex  #: (C, 3) scratch
-    event: Complex  #: (4, 3, 3) F above the event node, P at it, F below; scratch of other edges
+    event: Complex  #: (4, 3, 3) F above the event node, P at it, F below; F of a loose edge
     event_h: Complex  #: (4, C, 3, 3) the H of these
     event_j: Complex  #: (4, 3) their companions
     stub: Complex  #: (2, 3) voltages of p and q
