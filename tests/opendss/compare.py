@@ -138,7 +138,11 @@ def _cut(feeder: Feeder, state: OpenState) -> Cut | None:
     if state.line is None or state.phase is None:
         return None
     line = next(line for line in feeder.lines if line.name == state.line)
-    return Cut(line=line.name, at=0.0 if line.from_bus == state.bus else 1.0, phases=state.phase)
+    # a switch at the line's end has a bus of its own between; the other end tells
+    at_end = line.to_bus == state.bus or (
+        line.from_bus != state.bus and line.to_bus.startswith(f"{state.bus}_")
+    )
+    return Cut(line=line.name, at=1.0 if at_end else 0.0, phases=state.phase)
 
 
 def _solved(
@@ -173,11 +177,17 @@ def _solved(
 
 
 def _edge(network: Network, pair: Pair) -> tuple[int, bool]:
-    """The edge between m and the bus towards n, and whether m is its lower end."""
-    for k, piece in enumerate(network.pieces):
-        if piece is not None and set(piece.ends) == {pair.m, pair.towards}:
-            first = piece.ends[0] == pair.m
-            return k, bool(first != network.upward[k])
+    """The edge that leaves m towards the next bus, and whether m is its lower end.
+
+    A fuse or switch at the line's end may stand between, with a bus of its own.
+    """
+    ends = [set(piece.ends) if piece is not None else set() for piece in network.pieces]
+    beside = {bus for pieces in ends if pair.towards in pieces for bus in pieces}
+    for reached in ({pair.towards}, beside - {pair.m}):
+        for k, piece in enumerate(network.pieces):
+            if piece is not None and pair.m in ends[k] and ends[k] & reached:
+                first = piece.ends[0] == pair.m
+                return k, bool(first != network.upward[k])
     raise ValueError(f"nothing leads from {pair.m} to {pair.towards}")
 
 
