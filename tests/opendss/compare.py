@@ -23,7 +23,7 @@ from openphase.model.parts import Feeder
 from openphase.model.solve import quiet_state, solve
 from openphase.model.states import NOT_CONVERGED, Probes
 
-__all__ = ["EXACT", "Limits", "PairRow", "StateRow", "compare", "limits_of"]
+__all__ = ["EXACT", "Limits", "PairRow", "StateRow", "compare", "eq5", "limits_of"]
 
 Complex = NDArray[np.complex128]
 
@@ -118,9 +118,7 @@ def compare(
         for p, pair in enumerate(reference.pairs):
             if pair.name in state.z1_ohm:
                 here, there = network.node(pair.m), network.node(pair.n)
-                ours, condition = _eq5(
-                    *(_positive(x[:, [base, s]]) for x in (v[here], v[there], current[p]))
-                )
+                ours, condition = eq5(*(x[:, [base, s]] for x in (v[here], v[there], current[p])))
                 pairs.append(
                     PairRow(
                         state=state.name,
@@ -232,15 +230,17 @@ def _positive(abc: Complex) -> Complex:
     return np.asarray((abc[0] + TURN * abc[1] + TURN**2 * abc[2]) / 3.0)
 
 
-def _eq5(v_m: Complex, v_n: Complex, i_m: Complex) -> tuple[complex, float]:
-    """Equation (5) and how much it magnifies relative errors of the six phasors, at worst.
+def eq5(v_m: Complex, v_n: Complex, i_m: Complex) -> tuple[complex, float]:
+    """Equation (5) of the positive sequence, from (3, 2) phasors before and after.
 
-    The products that numerator and denominator subtract, over what is left of them.
+    And how much it magnifies relative errors of these phasors, at worst: the products that
+    numerator and denominator subtract, over what is left of them.
     """
+    v_m, v_n, i_m = _positive(v_m), _positive(v_n), _positive(i_m)
     over = v_m[1] * v_n[0] - v_n[1] * v_m[0]
     under = i_m[1] * v_m[0] - v_m[1] * i_m[0]
-    lost = [abs(v_m[1] * v_n[0]) + abs(v_n[1] * v_m[0]), abs(i_m[1] * v_m[0])]
-    lost[1] += abs(v_m[1] * i_m[0])
+    above = abs(v_m[1] * v_n[0]) + abs(v_n[1] * v_m[0])
+    below = abs(i_m[1] * v_m[0]) + abs(v_m[1] * i_m[0])
     with np.errstate(divide="ignore", invalid="ignore"):
-        condition = 2.0 * (lost[0] / abs(over) + lost[1] / abs(under))
+        condition = 2.0 * (above / abs(over) + below / abs(under))
         return complex(over / under), float(condition)
