@@ -142,6 +142,10 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
         for plant in circuit.plants
         for part in der_of(plant, live, build.buses, names, findings)
     ]
+    for control in circuit.tap_controls:
+        findings.add("regcontrol", control.name, "state kept", "taps stay as the file has them")
+    for name in circuit.cap_controls:
+        findings.add("capcontrol", name, "state kept", "steps stay as the file has them")
     for other in circuit.others:
         findings.add(other.kind, other.name, "refused", "a class that has no model")
     shunts = _shunts(build)
@@ -261,6 +265,7 @@ def _add_series(build: _Build) -> None:
             if regulator is not None:
                 name = regulator_names.new(regulator.name)
                 build.regulators.append(replace(regulator, name=name))
+    spans += banks.spans
     kept = [span for span in spans if span.name not in regulated.jumpers]
     build.built = line_parts(kept, circuit.guards, build.buses, findings)
 
