@@ -28,7 +28,7 @@ def solved_again(
 ) -> Reference:
     """The same states by the engine today; None leaves a setting as the engine has it.
 
-    ``root`` is the folder of the feeders. States of other loads than the file's are left out.
+    ``root`` is the folder of the feeders.
     """
     engine = new_context()
     text, circuit = engine.Text, engine.ActiveCircuit
@@ -44,19 +44,31 @@ def solved_again(
         text.Command = f"capacitor.{name}.states=[{' '.join(map(str, steps))}]"
     if tolerance is not None:
         text.Command = f"set tolerance={tolerance} maxiterations=2000"
+    nominal = _powers(circuit)
+    scaled = any(state.load != 1.0 for state in reference.states)
     states: list[OpenState] = []
-    bases: dict[str, dict[str, tuple[Three, Three, Three]]] = {}
+    bases: dict[tuple[str, float], dict[str, tuple[Three, Three, Three]]] = {}
     for state in reference.states:
-        if state.load != 1.0:
-            continue
+        for name, (kw, kvar) in nominal.items() if scaled else ():
+            text.Command = f"load.{name}.kw={kw * state.load!r} kvar={kvar * state.load!r}"
         solved, seen = _solved(engine, state, reference.pairs)
         if state.line is None:
-            bases[state.mode] = seen
+            bases[state.mode, state.load] = seen
         else:
-            z1 = {name: _z1(bases[state.mode][name], seen[name]) for name in state.z1_ohm}
+            z1 = {
+                name: _z1(bases[state.mode, state.load][name], seen[name]) for name in state.z1_ohm
+            }
             solved = replace(solved, z1_ohm=z1)
         states.append(solved)
     return replace(reference, states=tuple(states))
+
+
+def _powers(circuit: Any) -> dict[str, tuple[float, float]]:
+    powers = {}
+    for name in circuit.Loads.AllNames:
+        circuit.Loads.Name = name
+        powers[str(name)] = (float(circuit.Loads.kW), float(circuit.Loads.kvar))
+    return powers
 
 
 def _z1(before: tuple[Three, Three, Three], after: tuple[Three, Three, Three]) -> complex:

@@ -65,6 +65,7 @@ class StateRow:
     state: str
     worst_pu: float
     worst_bus: str
+    worst_between_pu: float  #: the same without each bus's common mode
     compared: int  #: phases of buses
     without_common_mode: int
     left_out: int
@@ -199,7 +200,7 @@ def _state_row(
 ) -> StateRow:
     floating = floating_nodes(feeder, cut)
     compared = without = left_out = 0
-    worst, worst_bus = 0.0, ""
+    worst, worst_bus, between = 0.0, "", 0.0
     for bus, theirs in state.volts.items():
         parts = [floating.get((bus, phase)) for phase in "abc"]
         off = ours[bus] - np.array(theirs)
@@ -213,10 +214,13 @@ def _state_row(
         own = float(np.abs(off[there]).max(initial=0.0)) / volts[bus]
         if not own <= worst:
             worst, worst_bus = own, bus
+        if there.all():
+            between = max(between, float(np.abs(off - off.mean()).max()) / volts[bus])
     return StateRow(
         state=state.name,
         worst_pu=worst,
         worst_bus=worst_bus,
+        worst_between_pu=between,
         compared=compared,
         without_common_mode=without,
         left_out=left_out,
