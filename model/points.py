@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .line_matrices import z1_ohm
 from .network import Network, Piece, compile_network, detached_end
 from .parts import Feeder, Point, Section
 from .sides import sides_of
@@ -110,10 +111,10 @@ def _terminals(
     lines = {edge.name for edge in path if edge.is_line}
     on_path = _edges_of_lines(network, lines)
     in_section = on_path | _laterals(feeder, network, lines, ends)
-    z1 = sum((li.z1_ohm_per_km * li.length_km for li in feeder.lines if li.name in lines), start=0j)
+    z1 = sum((z1_ohm(feeder, li) for li in feeder.lines if li.name in lines), start=0j)
     own_ends = {point.bus for point in ends if point.line in lines}
     edge_side, node_side = sides_of(feeder, network, on_path, in_section, own_ends)
-    in_loop = np.append(network.tree.in_loop, network.has_chord)[: on_path.size]
+    in_loop = np.append(network.tree.in_loop, np.ones(network.chords, np.bool_))
     loop_z1 = _loop_z1(feeder, network, in_loop) if bool(in_loop[on_path].all()) else None
     return [
         Terminal(
@@ -142,7 +143,7 @@ def _loop_z1(feeder: Feeder, network: Network, in_loop: NDArray[np.bool_]) -> co
     for k in np.flatnonzero(in_loop):
         piece = network.pieces[k]
         if piece is not None and piece.line is not None:
-            total += piece.length_km * lines[piece.line].z1_ohm_per_km
+            total += z1_ohm(feeder, lines[piece.line]) * (piece.stop - piece.start)
     return total
 
 
@@ -203,8 +204,9 @@ def _reaches_feed(feeder: Feeder, network: Network, node: int, cut: NDArray[np.b
     joined: list[tuple[int, int]] = [
         (int(network.tree.parent[k]), k) for k in range(1, len(network.nodes)) if not cut[k]
     ]
-    if network.has_chord and not cut[len(network.nodes)]:
-        joined.append((network.tree.fork, network.tree.tail))
+    for c in range(network.chords):
+        if not cut[len(network.nodes) + c]:
+            joined.append((int(network.tree.fork[c]), int(network.tree.tail[c])))
     reached = feeds
     grown = True
     while grown:

@@ -47,7 +47,7 @@ def sides_of(
     ends : collection of str
         Buses at which the section's own points stand on its side: they lie outside.
     """
-    if network.has_chord:
+    if network.chords:
         return _as_in_normal_state(feeder, network, on_path, in_section, ends)
     ways = _ways(network)
     inside = {p.line for k, p in enumerate(network.pieces) if p and on_path[k]}

@@ -182,7 +182,7 @@ def open_phase_a(
     whole = solve(network, before, probes)
     after = before._replace(open_mask=np.array([PHASE_A]))
     after = carried_over(network, before, whole, after, np.ones((len(feeder.ders), 1)))
-    broken = solve(network, after, probes, start=whole.unit_v_pu)
+    broken = solve(network, after, probes, start=whole.winding_v_pu)
     if (whole.flags[0] | broken.flags[0]) & NOT_CONVERGED:
         raise OpenPhaseError(f"{feeder.name}: loads or generation did not settle")
     into = into_line(points)[:, None, None]

@@ -14,7 +14,7 @@ from oracles.random_happenings import Happening, dense_event
 from openphase.model.network import Network, detached_end
 from openphase.model.parts import Feeder
 from openphase.model.solver.breaks import DEAD, FLOATING
-from openphase.model.states import NOT_CONVERGED, Answer
+from openphase.model.states import NOT_CONVERGED, Answer, unit_voltages
 
 __all__ = ["TOLERANCE", "Case", "Outcome", "compare", "gap_pu"]
 
@@ -86,8 +86,14 @@ def winding_voltages(
 ) -> dict[str, NDArray[np.float64]]:
     """The ladder's voltages, as a start for the reference."""
     network = case.network
-    units = network.tree.load_unit
-    found = {name: answer.unit_v_pu[units[n], :3, 0] for n, name in enumerate(network.loads)}
+    units, tree = unit_voltages(answer, len(network.units)), network.tree
+    branches = answer.winding_v_pu[4 * (len(network.units) + 1) :, 0]
+    found = {
+        name: units[tree.load_unit[n], :3, 0]
+        if tree.load_unit[n] >= 0
+        else branches[tree.branch_load == n]
+        for n, name in enumerate(network.loads)
+    }
     own = network.machines
     for m, unit in enumerate(own.unit):
         motors = own.motor_load.size
@@ -96,10 +102,10 @@ def winding_voltages(
             if m < motors
             else f"{own.ders[m - motors]}.der"
         )
-        found[name] = np.full(3, answer.unit_v_pu[unit, 3, 0])
+        found[name] = np.full(3, units[unit, 3, 0])
     for n, shunt in enumerate(event.shunts):
         if shunt.exponent != 2.0:
-            found[f"shunt {n}"] = answer.unit_v_pu[-1, [shunt.phase], 0]
+            found[f"shunt {n}"] = units[-1, [shunt.phase], 0]
     return found
 
 

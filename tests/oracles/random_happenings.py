@@ -76,7 +76,7 @@ def _edge(rng: np.random.Generator, network: Network) -> int:
     """A piece of line; where there is a loop, often one of it, and often its chord."""
     lines = np.flatnonzero(network.length_km > 0)
     chosen = lines
-    if network.has_chord and rng.random() < 0.5:
+    if network.chords and rng.random() < 0.5:
         chord = len(network.nodes)
         ring = [k for k in lines if k == chord or network.tree.in_loop[k]]
         chosen = np.array([chord] if rng.random() < 0.4 else ring)
