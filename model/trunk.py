@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from .buses import bus_volts
 from .line_matrices import z1_ohm
 from .parts import Feeder, InlineTransformer, Line, Place, Regulator, Switch
-from .zones import outwards
+from .zones import nodes_of, outwards
 
 __all__ = ["Step", "Trunk", "find_trunk"]
 
@@ -41,7 +41,7 @@ class Trunk:
     head: str
     end: str
     kv_ll: float
-    ends_at: str  #: what stands at its end
+    ends_at: str  #: why it ends there
 
 
 def find_trunk(feeder: Feeder) -> Trunk | None:
@@ -50,8 +50,8 @@ def find_trunk(feeder: Feeder) -> Trunk | None:
     It lies in that medium-voltage network, between the in-line transformers, which has the most
     three-phase line (of a low-voltage feeder, in that low-voltage network). Its head is where
     the source feeds that network, behind regulators that stand there. Ways are measured by
-    |Z1|; the end is the three-phase load, or transformer that leaves this network, which is
-    farthest from the head.
+    |Z1|; the end is the farthest bus where loads, or transformers to loads in other networks,
+    take from all three phases.
     """
     volts = bus_volts(feeder)
     joined, fed = _joined(feeder), tuple(outwards(feeder))
@@ -149,27 +149,56 @@ def _ways(
 
 def _farthest(feeder: Feeder, distance: dict[str, float]) -> tuple[str, str]:
     """The farthest bus of those with a three-phase load, and what stands there."""
-    ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
-    there: dict[str, str] = {}
+    there = {bus: what for bus, what in _loaded(feeder, distance).items() if distance[bus] > 0.0}
+    if there:
+        end = max(there, key=lambda bus: distance[bus])
+        return end, f"{there[end]} is the farthest three-phase load"
+    end = max(distance, key=lambda bus: distance[bus])
+    return end, "no three-phase load is on the way, and no three-phase bus farther"
 
-    def note(place: Place, what: str) -> None:
+
+def _loaded(feeder: Feeder, distance: dict[str, float]) -> dict[str, str]:
+    """Buses of the network where load on all three phases stands or leaves, and what it is."""
+    ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
+    phases: defaultdict[str, set[str]] = defaultdict(set)
+    what: defaultdict[str, list[str]] = defaultdict(list)
+
+    def note(place: Place, own: str, name: str) -> None:
         buses = ends[place.line] if place.line is not None else (place.bus or "",)
         known = [bus for bus in buses if bus in distance]
         if known:
-            there.setdefault(max(known, key=lambda bus: distance[bus]), what)
+            bus = max(known, key=lambda bus: distance[bus])
+            phases[bus] |= set(own)
+            what[bus].append(name)
 
     for load in feeder.loads:
-        if load.place is not None and len(load.phases) == 3:
-            note(load.place, f"the load {load.name}")
+        if load.place is not None:
+            note(load.place, load.phases, load.name)
     for unit in feeder.transformers:
-        note(unit.place, f"the transformer {unit.name}")
+        note(unit.place, "abc", unit.name)
+    feeding = _feeding(feeder)
     for inline in feeder.inline_transformers:
-        if _is_whole(inline):
-            note(Place(bus=inline.from_bus), f"the transformer {inline.name}")
-    if not any(distance[bus] > 0.0 for bus in there):
-        there = dict.fromkeys(distance, "a three-phase bus; no three-phase load lies on the way")
-    end = max(there, key=lambda bus: distance[bus])
-    return end, there[end]
+        if inline.name in feeding:
+            note(Place(bus=inline.from_bus), inline.phases, inline.name)
+    return {bus: what[bus][0] for bus, own in phases.items() if len(own) == 3}
+
+
+def _feeding(feeder: Feeder) -> set[str]:
+    """In-line transformers with any load behind them."""
+    before: dict[str, str] = {}
+    order = list(outwards(feeder))
+    place = {bus: n for n, bus in enumerate(order)}
+    parts: list[Joint | InlineTransformer] = [*feeder.lines, *feeder.switches]
+    for part in [*parts, *feeder.regulators, *feeder.inline_transformers]:
+        near, far = sorted((part.from_bus, part.to_bus), key=lambda bus: place.get(bus, -1))
+        before.setdefault(far, near)
+    loaded = {bus for kind, bus in nodes_of(feeder, feeder.loads) if kind == "bus"}
+    ends = {line.name: line.to_bus for line in feeder.lines}
+    loaded |= {ends[name] for kind, name in nodes_of(feeder, feeder.loads) if kind == "line"}
+    for bus in reversed(order):
+        if bus in loaded and bus in before:
+            loaded.add(before[bus])
+    return {unit.name for unit in feeder.inline_transformers if unit.to_bus in loaded}
 
 
 def _steps(path: list[Way], ohm: dict[str, float]) -> list[Step]:

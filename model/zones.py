@@ -97,7 +97,7 @@ def adjacent_sections(
     pair for each remote point. Where two points feed a zone that has no other, they are a pair.
     """
     zones, joined = zones_of(feeder, points), _joined(feeder, points)
-    sections: list[Section] = []
+    chosen: list[tuple[int, int]] = []
     left_out: list[str] = []
     for number, (entries, exits) in enumerate(zip(zones.entries, zones.exits, strict=True)):
         pairs = [(entry, remote) for entry in entries[:1] for remote in exits]
@@ -110,7 +110,8 @@ def adjacent_sections(
         for local, remote in pairs:
             ends = [_inner_side(points[n], zones, number) for n in (local, remote)]
             if _has_line_between(joined, *ends):
-                sections.append(Section(local=points[local].name, remote=points[remote].name))
+                chosen.append((local, remote))
+    sections = (Section(local=points[a].name, remote=points[b].name) for a, b in sorted(chosen))
     return tuple(sections), tuple(left_out)
 
 

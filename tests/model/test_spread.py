@@ -137,7 +137,7 @@ def test_the_trunk_is_of_the_medium_voltage_network_and_ends_where_a_unit_leaves
     trunk = find_trunk(feeder)
     assert trunk is not None
     assert (trunk.head, trunk.end, round(trunk.kv_ll, 6)) == ("B0", "B3", 12.0)
-    assert trunk.ends_at == "the transformer mill"
+    assert trunk.ends_at == "mill is the farthest three-phase load"
     far_lv = replace(feeder, lines=(*feeder.lines, line("cable", "LV", "LV2", km=0.5)))
     assert find_trunk(far_lv) == trunk
 
@@ -176,3 +176,15 @@ def test_open_switches_end_the_trunk_and_one_place_is_refused():
     assert spread_points(beyond).feeder.points[-1].bus == "B3"
     with pytest.raises(ValueError, match="at least two places, got 1"):
         spread_points(feeder, 1)
+
+
+def test_three_single_phase_loads_are_a_three_phase_load_and_idle_units_are_none():
+    feeder = chain([1.0] * 6)
+    ones = tuple(
+        replace(plain_load(f"one{p}", Place(bus="B4")), phases=p, connection="wye") for p in "abc"
+    )
+    pair = replace(plain_load("pair", Place(bus="B6")), phases="ab")
+    idle = inline("idle", "B5", "LV", 12.0, 0.48)
+    trunk = find_trunk(replace(feeder, loads=(*ones, pair), inline_transformers=(idle,)))
+    assert trunk is not None
+    assert trunk.end == "B4"
