@@ -50,8 +50,7 @@ def find_trunk(feeder: Feeder) -> Trunk | None:
     It lies in that medium-voltage network, between the in-line transformers, which has the most
     three-phase line (of a low-voltage feeder, in that low-voltage network). Its head is where
     the source feeds that network, behind regulators that stand there. Ways are measured by
-    |Z1|; the end is the farthest bus where loads, or transformers to loads in other networks,
-    take from all three phases.
+    |Z1|; the end is the farthest bus that has or feeds load on all three phases.
     """
     volts = bus_volts(feeder)
     joined, fed = _joined(feeder), tuple(outwards(feeder))
@@ -148,57 +147,42 @@ def _ways(
 
 
 def _farthest(feeder: Feeder, distance: dict[str, float]) -> tuple[str, str]:
-    """The farthest bus of those with a three-phase load, and what stands there."""
-    there = {bus: what for bus, what in _loaded(feeder, distance).items() if distance[bus] > 0.0}
-    if there:
-        end = max(there, key=lambda bus: distance[bus])
-        return end, f"{there[end]} is the farthest three-phase load"
-    end = max(distance, key=lambda bus: distance[bus])
-    return end, "no three-phase load is on the way, and no three-phase bus farther"
+    """The farthest bus that feeds load on all three phases, and why it is the end."""
+    fed = _fed_phases(feeder)
+    there = [bus for bus, ohm in distance.items() if ohm > 0.0 and len(fed[bus]) == 3]
+    why = "no three-phase line goes farther to load on all three phases"
+    if not there:
+        there, why = list(distance), "no three-phase load is on the way, and no bus farther"
+    return max(there, key=lambda bus: distance[bus]), why
 
 
-def _loaded(feeder: Feeder, distance: dict[str, float]) -> dict[str, str]:
-    """Buses of the network where load on all three phases stands or leaves, and what it is."""
-    ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
-    phases: defaultdict[str, set[str]] = defaultdict(set)
-    what: defaultdict[str, list[str]] = defaultdict(list)
-
-    def note(place: Place, own: str, name: str) -> None:
-        buses = ends[place.line] if place.line is not None else (place.bus or "",)
-        known = [bus for bus in buses if bus in distance]
-        if known:
-            bus = max(known, key=lambda bus: distance[bus])
-            phases[bus] |= set(own)
-            what[bus].append(name)
-
-    for load in feeder.loads:
-        if load.place is not None:
-            note(load.place, load.phases, load.name)
-    for unit in feeder.transformers:
-        note(unit.place, "abc", unit.name)
-    feeding = _feeding(feeder)
-    for inline in feeder.inline_transformers:
-        if inline.name in feeding:
-            note(Place(bus=inline.from_bus), inline.phases, inline.name)
-    return {bus: what[bus][0] for bus, own in phases.items() if len(own) == 3}
-
-
-def _feeding(feeder: Feeder) -> set[str]:
-    """In-line transformers with any load behind them."""
-    before: dict[str, str] = {}
+def _fed_phases(feeder: Feeder) -> dict[str, set[str]]:
+    """Phases of every bus that take load there, or beyond it as the source feeds the buses."""
     order = list(outwards(feeder))
     place = {bus: n for n, bus in enumerate(order)}
-    parts: list[Joint | InlineTransformer] = [*feeder.lines, *feeder.switches]
-    for part in [*parts, *feeder.regulators, *feeder.inline_transformers]:
+    before: dict[str, tuple[str, Joint | InlineTransformer]] = {}
+    parts: list[Joint | InlineTransformer] = [*feeder.lines, *feeder.regulators]
+    closed = (switch for switch in feeder.switches if switch.closed)
+    for part in [*parts, *closed, *feeder.inline_transformers]:
         near, far = sorted((part.from_bus, part.to_bus), key=lambda bus: place.get(bus, -1))
-        before.setdefault(far, near)
-    loaded = {bus for kind, bus in nodes_of(feeder, feeder.loads) if kind == "bus"}
-    ends = {line.name: line.to_bus for line in feeder.lines}
-    loaded |= {ends[name] for kind, name in nodes_of(feeder, feeder.loads) if kind == "line"}
+        if far not in before or place.get(near, -1) < place.get(before[far][0], -1):
+            before[far] = near, part
+    fed: dict[str, set[str]] = {bus: set() for bus in order}
+    ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
+    for load, (kind, name) in zip(feeder.loads, nodes_of(feeder, feeder.loads), strict=True):
+        buses = (name,) if kind == "bus" else ends[name]
+        known = [bus for bus in buses if bus in place]
+        if known:
+            phases = load.phases if load.transformer is None else "abc"
+            fed[max(known, key=lambda bus: place[bus])] |= set(phases)
     for bus in reversed(order):
-        if bus in loaded and bus in before:
-            loaded.add(before[bus])
-    return {unit.name for unit in feeder.inline_transformers if unit.to_bus in loaded}
+        if bus in before and fed[bus]:
+            near, part = before[bus]
+            own = fed[bus]
+            if isinstance(part, InlineTransformer):
+                own = set(part.phases if part.from_bus == near else part.to_phases)
+            fed.setdefault(near, set()).update(own)
+    return fed
 
 
 def _steps(path: list[Way], ohm: dict[str, float]) -> list[Step]:

@@ -137,7 +137,7 @@ def test_the_trunk_is_of_the_medium_voltage_network_and_ends_where_a_unit_leaves
     trunk = find_trunk(feeder)
     assert trunk is not None
     assert (trunk.head, trunk.end, round(trunk.kv_ll, 6)) == ("B0", "B3", 12.0)
-    assert trunk.ends_at == "mill is the farthest three-phase load"
+    assert "all three phases" in trunk.ends_at
     far_lv = replace(feeder, lines=(*feeder.lines, line("cable", "LV", "LV2", km=0.5)))
     assert find_trunk(far_lv) == trunk
 
