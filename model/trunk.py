@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from .buses import bus_volts
 from .line_matrices import z1_ohm
-from .parts import Feeder, InlineTransformer, Line, Place, Regulator, Switch
+from .parts import Feeder, InlineTransformer, Line, Regulator, Switch
 from .zones import nodes_of, outwards
 
 __all__ = ["Step", "Trunk", "find_trunk"]
@@ -178,7 +178,7 @@ def _fed_phases(feeder: Feeder) -> dict[str, set[str]]:
     for bus in reversed(order):
         if bus in before and fed[bus]:
             near, part = before[bus]
-            own = fed[bus]
+            own = fed[bus] & set(part.phases)
             if isinstance(part, InlineTransformer):
                 own = set(part.phases if part.from_bus == near else part.to_phases)
             fed.setdefault(near, set()).update(own)
