@@ -45,7 +45,7 @@ def hang_edges(feeder: Feeder, pieces: list[Piece | None], index: dict[str, int]
     ports = _ports(pieces[:count], upward)
     for k, port in ports.items():
         z[k] = port.z_ohm
-    for k in np.flatnonzero(regulator >= 0):
+    for k in np.flatnonzero(regulator >= 0).tolist():
         z[k] = regulator_impedance(feeder.regulators[regulator[k]], bool(upward[k]))
     shunt = np.zeros((count, 3, 3), np.complex128)
     np.add.at(shunt, upper[1:], end_y[1:])
@@ -116,7 +116,7 @@ def _chains(parent: Int, tail: Int, fork: Int) -> NDArray[np.bool_]:
     carried = np.zeros((parent.size, tail.size), np.bool_)
     for c in range(tail.size):
         k = int(tail[c])
-        while k != fork[c]:
+        while k != int(fork[c]):
             carried[k, c] = True
             k = int(parent[k])
     return carried
@@ -162,7 +162,8 @@ def _loose(
     node_phases: Int,
 ) -> tuple[Int, NDArray[np.float64]]:
     """The modes that each edge leaves loose at its lower end."""
-    start, modes = [0], []
+    start = [0]
+    modes: list[NDArray[np.float64]] = []
     for k, piece in enumerate(pieces):
         if piece is not None:
             above, below = piece.phases if upward[k] else piece.phases[::-1]

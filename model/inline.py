@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .line_matrices import phase_mask, phase_rows
 from .parts import InlineTransformer, Regulator
+from .phases import conductors, phase_mask, phase_rows
 
 __all__ = ["TwoPort", "bank_admittance", "regulator_impedance", "regulator_ratio", "two_port"]
 
@@ -202,7 +202,7 @@ def _clean(matrix: Complex, scale: float | None = None) -> Complex:
 def regulator_ratio(part: Regulator, upward: bool) -> NDArray[np.float64]:
     """(3,) lower over upper voltage of each phase; 1 where there is no unit."""
     taps = 1.0 + np.array(part.taps) * part.step_pct / 100.0
-    there = np.array([phase in part.phases and phase != part.reference for phase in "abc"])
+    there = np.array([phase in part.phases for phase in "abc"])
     taps = np.where(there, taps, 1.0)
     if not upward and part.reference == "next":
         raise InputError.single(
@@ -226,13 +226,11 @@ def regulator_impedance(part: Regulator, upward: bool) -> Complex:
     z = np.zeros((3, 3), np.complex128)
     ratio = regulator_ratio(part, True)
     for phase in phase_rows(part.phases):
-        own = part.z_ohm * ratio[phase] ** 2
-        if "abc"[phase] == part.reference:
-            # every unit's return current comes back through the phase they refer to
-            rows = phase_rows(part.phases)
-            z[np.ix_(rows, rows)] += part.jumper_ohm
-        else:
-            z[phase, phase] += own
+        z[phase, phase] = part.z_ohm * ratio[phase] ** 2
+    if part.reference in "abc":
+        # every unit's return current comes back through the phase they refer to
+        rows = phase_rows(conductors(part))
+        z[np.ix_(rows, rows)] += part.jumper_ohm
     if upward or not z.any():
         return z
     turn = np.diag(ratio).astype(np.complex128)

@@ -167,7 +167,7 @@ def compile_network(
     edge_pieces = [None, *(pieces[parent_piece[n]] for n in order[1:]), *chords]
     index = {name: k for k, name in enumerate(order)}
     edges = hang_edges(feeder, edge_pieces, index)
-    nodes = Nodes(index=index, volts=_node_volts(feeder, pieces, order))
+    nodes = Nodes(row=index, volts=_node_volts(feeder, pieces, order))
     units = units_of(feeder, motors)
     machines = machines_of(feeder, units, motors)
     unit_node = np.array([index[node_name(feeder, place_of(u))] for u in units], np.int64)

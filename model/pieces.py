@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .inline import bank_admittance, mask_of
-from .line_matrices import phase_mask, shunt_nf_per_km, z_ohm_per_km
+from .line_matrices import shunt_nf_per_km, z_ohm_per_km
 from .parts import (
     Capacitor,
     Der,
@@ -24,6 +24,7 @@ from .parts import (
     Switch,
     Transformer,
 )
+from .phases import conductors, phase_mask
 
 __all__ = [
     "NO_PHASES",
@@ -127,7 +128,7 @@ def pieces_of(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) ->
         pieces += _cut(line, codes, cuts[line.name], behind[line.name], omega)
     joining: list[Regulator | Switch] = [s for s in feeder.switches if s.name in closed]
     for part in [*joining, *feeder.regulators]:
-        mask = phase_mask(part.phases)
+        mask = phase_mask(conductors(part) if isinstance(part, Regulator) else part.phases)
         name = part.name if isinstance(part, Regulator) else None
         ends = (part.from_bus, part.to_bus)
         pieces.append(_without_length(ends, (mask, mask), regulator=name))
@@ -192,7 +193,8 @@ def _cut(
     names = [ends[0], *(_tee(line.name, x) for x in fractions[1:-1]), ends[1]]
     code = None if line.code is None else codes[line.code]
     whole = line.length_km * z_ohm_per_km(line, code)
-    half = 0.5j * omega * line.length_km * 1e-9 * shunt_nf_per_km(line, code)
+    farad = 0.5e-9 * line.length_km * shunt_nf_per_km(line, code)
+    half = np.asarray(1j * omega * farad, np.complex128)
     mask = phase_mask(line.phases)
     return [
         Piece(

@@ -75,13 +75,12 @@ def quiet_state(
 
 def new_answer(network: Network, probes: Probes, scenarios: int) -> Answer:
     """An empty answer whose fixed point starts from nominal voltages."""
+    windings = 4 * (len(network.units) + 1) + network.tree.branch_load.size
     return Answer(
         v=np.empty((probes.v_node.size, 3, scenarios), np.complex128),
         i=np.empty((probes.i_edge.size, 3, scenarios), np.complex128),
         stub=np.empty((2, 3, scenarios), np.complex128),
-        winding_v_pu=np.ones(
-            (4 * (len(network.units) + 1) + network.tree.branch_load.size, scenarios)
-        ),
+        winding_v_pu=np.ones((windings, scenarios)),
         machine_v1_v=np.zeros((network.machines.count, scenarios), np.complex128),
         flags=np.zeros(scenarios, np.int64),
         passes=np.zeros(scenarios, np.int64),

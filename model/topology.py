@@ -1,20 +1,21 @@
-"""The feeder as a graph: buses joined by lines, switches and regulators."""
+"""The feeder as a graph: buses joined by lines, switches, regulators and transformers."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from heapq import heappop, heappush
 
 from .errors import KeyPath
 from .parts import Feeder
 
-__all__ = ["Edge", "Tree", "buses", "edges", "forest", "tree_path"]
+__all__ = ["Edge", "Tree", "buses", "edges", "forest", "shortest_path", "tree_path"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edge:
-    """A line, switch or regulator in the graph; ``path`` is its key path in the document."""
+    """What joins two buses in the graph; ``path`` is its key path in the document."""
 
     path: KeyPath
     name: str
@@ -30,8 +31,11 @@ Tree = dict[str, tuple[str, Edge] | None]
 """Bus -> the bus before it and the edge between them; None for the root. Depth first."""
 
 
-def edges(feeder: Feeder) -> tuple[Edge, ...]:
-    """Return the lines, the normally closed switches and the regulators, in the feeder's order."""
+def edges(feeder: Feeder, *, ties: bool = False) -> tuple[Edge, ...]:
+    """Return lines, switches, regulators and in-line transformers, in the feeder's order.
+
+    Of the switches those that are normally closed, or with ``ties`` all.
+    """
     lines = (
         Edge(path=("lines", index), name=line.name, ends=(line.from_bus, line.to_bus))
         for index, line in enumerate(feeder.lines)
@@ -39,18 +43,58 @@ def edges(feeder: Feeder) -> tuple[Edge, ...]:
     switches = (
         Edge(path=("switches", index), name=switch.name, ends=(switch.from_bus, switch.to_bus))
         for index, switch in enumerate(feeder.switches)
-        if switch.closed
+        if switch.closed or ties
     )
     regulators = (
         Edge(path=("regulators", index), name=part.name, ends=(part.from_bus, part.to_bus))
         for index, part in enumerate(feeder.regulators)
     )
-    return (*lines, *switches, *regulators)
+    transformers = (
+        Edge(path=("inline_transformers", index), name=unit.name, ends=(unit.from_bus, unit.to_bus))
+        for index, unit in enumerate(feeder.inline_transformers)
+    )
+    return (*lines, *switches, *regulators, *transformers)
 
 
 def buses(feeder: Feeder) -> tuple[str, ...]:
     """Return the buses of a checked feeder depth first from the source, ties open."""
     return tuple(forest(edges(feeder), [feeder.source.bus])[0])
+
+
+def shortest_path(
+    graph: Sequence[Edge], start: str, end: str, preferred: Collection[str] = ()
+) -> tuple[list[str], list[Edge]]:
+    """Return the buses and the edges of the shortest way between two buses, ``start`` first.
+
+    That with the fewest edges; among several that with the most lines of the ``preferred``
+    names, then that of the edges which stand first. Without a way both lists are empty.
+    """
+    neighbours: defaultdict[str, list[tuple[str, int]]] = defaultdict(list)
+    for n, edge in enumerate(graph):
+        for here, there in (edge.ends, edge.ends[::-1]):
+            neighbours[here].append((there, n))
+    before: dict[str, tuple[str, int]] = {}
+    reached: set[str] = set()
+    waiting: list[tuple[int, int, int, str, str, int]] = [(0, 0, 0, start, "", -1)]
+    count = 0
+    while waiting and end not in reached:
+        hops, liked, _, bus, came_from, over = heappop(waiting)
+        if bus in reached:
+            continue
+        reached.add(bus)
+        before[bus] = (came_from, over)
+        for there, n in neighbours[bus]:
+            if there not in reached:
+                count += 1
+                likes = graph[n].is_line and graph[n].name in preferred
+                heappush(waiting, (hops + 1, liked - likes, count, there, bus, n))
+    if end not in reached:
+        return [], []
+    passed, taken = [end], []
+    while (step := before[passed[-1]])[1] >= 0:
+        passed.append(step[0])
+        taken.append(graph[step[1]])
+    return passed[::-1], taken[::-1]
 
 
 def forest(graph: Sequence[Edge], roots: Iterable[str]) -> list[Tree]:

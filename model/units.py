@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .inline import regulator_ratio, regulator_reference
-from .line_matrices import phase_rows
 from .machines import Machines, has_motor, load_va
 from .parts import Capacitor, Der, Feeder, Load, Source, Transformer
+from .phases import phase_rows
 from .pieces import Piece, node_name
 from .solver.bank import D_D, D_YG, Y_D, YG_D, YG_YG
 
@@ -52,7 +52,7 @@ ROOT = 3.0**0.5
 class Nodes(NamedTuple):
     """The nodes of a network: the index of each name, and nominal volts."""
 
-    index: dict[str, int]
+    row: dict[str, int]
     volts: NDArray[np.float64]
 
 
@@ -120,7 +120,7 @@ def loads_of(
             y.append(load_va(load).conjugate() / 3.0 / unit_v[unit] ** 2)
             continue
         assert load.place is not None
-        node = nodes.index[node_name(feeder, load.place)]
+        node = nodes.row[node_name(feeder, load.place)]
         pairs, volts = branches_of(load, float(nodes.volts[node]))
         branches += [(n, node, i, j, volts) for i, j in pairs]
         y.append(load_va(load).conjugate() / len(pairs) / volts**2)
@@ -150,9 +150,9 @@ def branches_of(part: Load | Capacitor, node_v: float) -> tuple[list[tuple[int, 
 
 def capacitor_shunts(feeder: Feeder, nodes: Nodes) -> NDArray[np.complex128]:
     """(B, 3, 3) admittance of the capacitor banks on each node."""
-    shunt = np.zeros((len(nodes.index), 3, 3), np.complex128)
+    shunt = np.zeros((len(nodes.row), 3, 3), np.complex128)
     for bank in feeder.capacitors:
-        node = nodes.index[node_name(feeder, bank.place)]
+        node = nodes.row[node_name(feeder, bank.place)]
         pairs, volts = branches_of(bank, float(nodes.volts[node]))
         y = 1j * bank.kvar * 1000.0 / len(pairs) / volts**2
         for i, j in pairs:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..parts import Feeder, Origin, OriginKey
@@ -66,11 +66,36 @@ def _assumes(field: Field) -> bool:
 
 def _concerns(table: str, field: str, row: _Row) -> bool:
     """Whether the field says anything about a row with these values."""
-    if table == "loads" and field == "connection":
-        return row["transformer"] is None
-    if table == "transformers" and field == "x0_pu":
-        return row["connection"] in ("Yg/Yg", "unknown")
-    return True
+    if table == "inline_transformers":
+        return _concerns_inline(field, row["connection"])
+    concerns = _CONCERNS.get((table, field))
+    return concerns is None or concerns(row)
+
+
+_CONCERNS: dict[tuple[str, str], Callable[[_Row], bool]] = {
+    ("loads", "connection"): lambda row: row["transformer"] is None,
+    ("loads", "phases"): lambda row: row["transformer"] is None,
+    ("loads", "branch_kv"): lambda row: row["transformer"] is None,
+    ("loads", "power_factor"): lambda row: row["kvar"] is None,
+    ("loads", "exponent"): lambda row: row["zip"] is None,
+    ("lines", "c1_nf_per_km"): lambda row: row["code"] is None,
+    ("lines", "c0_nf_per_km"): lambda row: row["code"] is None,
+    ("transformers", "x0_pu"): lambda row: row["connection"] in ("Yg/Yg", "unknown"),
+    ("regulators", "jumper_ohm"): lambda row: row["reference"] in ("a", "b", "c"),
+}
+"""Where that depends on other values of the row."""
+
+
+def _concerns_inline(field: str, connection: str) -> bool:
+    """Whether the field says anything about a transformer of this connection."""
+    if field in ("phases", "to_phases"):
+        return connection in ("single", "centre-tap")
+    start, _, end = connection.partition("/")
+    return {
+        "shift": (start == "D") != (end == "D"),
+        "from_neutral_ohm": start == "Yg",
+        "to_neutral_ohm": end == "Yg",
+    }.get(field, True)
 
 
 def is_written(field: Field, row: _Row, origin: Origin | None) -> bool:

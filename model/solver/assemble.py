@@ -75,7 +75,7 @@ def load_admittance(
     tree: Tree, state: State, n: int, s: int, v_pu: float, floor_pu: float
 ) -> complex:
     """Admittance of one winding or branch of load n at the voltage across it."""
-    nominal = tree.load_y_s[n] * state.load_scale[n, s]
+    nominal = complex(tree.load_y_s[n] * state.load_scale[n, s])
     exponent = state.exponent[n, s]
     if exponent == 2.0:
         return nominal

@@ -212,14 +212,14 @@ def free_modes(tree: Tree, k: int, work: Work, carried: Flags) -> int:
 def w_times(work: Work, e: NDArray[np.float64], i: int) -> complex:
     """``(W e)_i``."""
     w = work.here[0]
-    return w[i, 0] * e[0] + w[i, 1] * e[1] + w[i, 2] * e[2]
+    return complex(w[i, 0] * e[0] + w[i, 1] * e[1] + w[i, 2] * e[2])
 
 
 @compiled
 def times_w(work: Work, e: NDArray[np.float64], j: int) -> complex:
     """``(e' W)_j``."""
     w = work.here[0]
-    return e[0] * w[0, j] + e[1] * w[1, j] + e[2] * w[2, j]
+    return complex(e[0] * w[0, j] + e[1] * w[1, j] + e[2] * w[2, j])
 
 
 @compiled

@@ -100,7 +100,7 @@ def find_gaps(tree: Tree, state: State, work: Work, s: int) -> float:
 @compiled
 def magnitude(value: complex) -> float:
     """``|value|``."""
-    return np.sqrt(value.real * value.real + value.imag * value.imag)
+    return float(np.sqrt(value.real * value.real + value.imag * value.imag))
 
 
 @compiled

@@ -300,7 +300,6 @@ def test_before_an_energisation_all_beyond_is_dead_and_draws_nothing(site: Site)
     """As if neither the loads nor the DER beyond were there, connected DER elsewhere included."""
     event = draw("energisation", site, 30)
     before, _ = site.answers(event)
-    tree = site.network.tree
     for s in range(30):
         edge = int(event.edge[s])
         beyond = site.network.below(edge)
