@@ -158,16 +158,9 @@ def _farthest(feeder: Feeder, distance: dict[str, float]) -> tuple[str, str]:
 
 def _fed_phases(feeder: Feeder) -> dict[str, set[str]]:
     """Phases of every bus that take load there, or beyond it as the source feeds the buses."""
-    order = list(outwards(feeder))
-    place = {bus: n for n, bus in enumerate(order)}
-    before: dict[str, tuple[str, Joint | InlineTransformer]] = {}
-    parts: list[Joint | InlineTransformer] = [*feeder.lines, *feeder.regulators]
-    closed = (switch for switch in feeder.switches if switch.closed)
-    for part in [*parts, *closed, *feeder.inline_transformers]:
-        near, far = sorted((part.from_bus, part.to_bus), key=lambda bus: place.get(bus, -1))
-        if far not in before or place.get(near, -1) < place.get(before[far][0], -1):
-            before[far] = near, part
-    fed: dict[str, set[str]] = {bus: set() for bus in order}
+    before = outwards(feeder)
+    place = {bus: n for n, bus in enumerate(before)}
+    fed: dict[str, set[str]] = {bus: set() for bus in before}
     ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
     for load, (kind, name) in zip(feeder.loads, nodes_of(feeder, feeder.loads), strict=True):
         buses = (name,) if kind == "bus" else ends[name]
@@ -175,13 +168,13 @@ def _fed_phases(feeder: Feeder) -> dict[str, set[str]]:
         if known:
             phases = load.phases if load.transformer is None else "abc"
             fed[max(known, key=lambda bus: place[bus])] |= set(phases)
-    for bus in reversed(order):
-        if bus in before and fed[bus]:
-            near, part = before[bus]
+    for bus, step in reversed(before.items()):
+        if step is not None and fed[bus]:
+            near, part = step
             own = fed[bus] & set(part.phases)
             if isinstance(part, InlineTransformer):
                 own = set(part.phases if part.from_bus == near else part.to_phases)
-            fed.setdefault(near, set()).update(own)
+            fed[near] |= own
     return fed
 
 
