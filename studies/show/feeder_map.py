@@ -204,7 +204,7 @@ def _draw_parts(ax: Axes, feeder: Feeder, places: Places) -> list[Line2D]:
         spots = [(text, spot) for text, spot in found if spot is not None]
         if not spots:
             continue
-        named = len(spots) <= FEW and (few or mark.shape != "8")
+        named = len(spots) <= FEW and (few or mark.shape not in "8h")
         size = mark.size if len(spots) <= FEW else min(mark.size, 4.5)
         own = Mark(shape=mark.shape, size=size, face=mark.face, name=mark.name)
         handles.append(draw_mark(ax, [spot for _, spot in spots], own))
@@ -250,7 +250,7 @@ def _marks(
     name = "in-line transformer" if few else "three-phase transformer"
     return [
         (Mark(shape="8", size=3.0, face="white", name="single-phase unit"), between(single)),
-        (Mark(shape="8", size=8.0, face="white", name=name), between(whole)),
+        (Mark(shape="h", size=8.5, face="#d0d0d0", name=name), between(whole)),
         (
             Mark(shape="^", size=5.0, face="#555555", name="transformer"),
             [(unit.name, stands(unit.place)) for unit in feeder.transformers],
