@@ -137,7 +137,7 @@ def test_the_trunk_is_of_the_medium_voltage_network_and_ends_where_a_unit_leaves
     trunk = find_trunk(feeder)
     assert trunk is not None
     assert (trunk.head, trunk.end, round(trunk.kv_ll, 6)) == ("B0", "B3", 12.0)
-    assert "all three phases" in trunk.ends_at
+    assert "on all phases" in trunk.ends_at
     far_lv = replace(feeder, lines=(*feeder.lines, line("cable", "LV", "LV2", km=0.5)))
     assert find_trunk(far_lv) == trunk
 
@@ -188,3 +188,14 @@ def test_three_single_phase_loads_are_a_three_phase_load_and_idle_units_are_none
     trunk = find_trunk(replace(feeder, loads=(*ones, pair), inline_transformers=(idle,)))
     assert trunk is not None
     assert trunk.end == "B4"
+
+
+def test_a_trifle_at_the_far_end_is_not_worth_the_way():
+    feeder = chain([1.0] * 6)
+    main = plain_load("main", Place(bus="B4"), kw=1000.0)
+    trifle = plain_load("trifle", Place(bus="B6"), kw=9.0)
+    for kw, end in ((9.0, "B4"), (11.0, "B6")):
+        loads = (main, replace(trifle, kw=kw))
+        trunk = find_trunk(replace(feeder, loads=loads))
+        assert trunk is not None
+        assert trunk.end == end
