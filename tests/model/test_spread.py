@@ -154,13 +154,17 @@ def test_random_trees_get_points_that_make_sections(seed):
         (a.name, b.name) for a, b in pairwise(points)
     ]
     assert len(points) <= 4
-    # the end is as far from the source as any load is
-    ohm = {"B0": 0.0}
+    # the end is as far from the source as any bus that still feeds a hundredth of the load
+    ohm, up = {"B0": 0.0}, {}
     for bus, name in above.items():
         own = lines[name]
-        up = own.from_bus if own.to_bus == bus else own.to_bus
-        ohm[bus] = ohm[up] + abs(z1_ohm(feeder, own))
-    assert ohm[points[-1].bus] == pytest.approx(max(ohm.values()))
+        up[bus] = own.from_bus if own.to_bus == bus else own.to_bus
+        ohm[bus] = ohm[up[bus]] + abs(z1_ohm(feeder, own))
+    kw = {"B0": 0.0} | {f"B{load.name[1:]}": load.kw for load in feeder.loads}
+    for bus in reversed(list(above)):
+        kw[up[bus]] += kw[bus]
+    worth = [ohm[bus] for bus in ohm if kw[bus] >= 0.01 * kw["B0"]]
+    assert ohm[points[-1].bus] == pytest.approx(max(worth))
 
 
 def test_a_feeder_with_points_keeps_them():
