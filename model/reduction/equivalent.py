@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .primitives import branches_of
+from ..phases import phase_rows
 
 __all__ = [
     "Equivalent",
@@ -154,14 +154,10 @@ def _unit_shapes() -> list[tuple[str, Literal["wye", "delta"], Complex]]:
 @cache
 def across(phases: str, connection: str) -> NDArray[np.float64]:
     """(branches, 3) voltage of each branch per voltage of the phases."""
-    rows = np.zeros((0, 3))
-    for start, end in branches_of(phases, connection):
-        branch = np.zeros(3)
-        branch[start] = 1.0
-        if end >= 0:
-            branch[end] = -1.0
-        rows = np.vstack([rows, branch])
-    return rows
+    own = np.eye(3)[phase_rows(phases)]
+    if connection == "wye":
+        return own
+    return (own - np.roll(own, -1, axis=0))[: 3 if len(own) > 2 else 1]
 
 
 SHAPES = _unit_shapes()

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ..buses import bus_volts
 from ..parts import Feeder, InlineTransformer, Line, Load
+from ..solver.assemble import law_factors
 from .equivalent import Equivalent, Kind, SeenLoad, equivalent_of, seen_through
 from .foldable import fold_roots, kept_by_default
 from .folded_part import FoldedPart, Seen, folded_part, seen_from_roots
-from .rebuild import Stub, free_name, moved_load, names_in, stub_of
+from .rebuild import Stub, WasAt, free_name, moved_load, names_in, stub_of
 
 __all__ = ["LEVEL", "WITHIN", "Folded", "FoldedRoot", "fold"]
 
@@ -112,9 +113,8 @@ def fold(
         stub_v = equivalent.stub_gain @ root_v[n]
         for fit, rows in zip(equivalent.fits, own[n], strict=True):
             load = part.loads[part.branch_load[rows[0]]]
-            v_was = float(np.abs(state.branch_v[rows]).mean())
-            there = (_mean_y(state, rows), v_was, float(part.branch_v[rows[0]]))
-            moved[load.name] = moved_load(load, stubs[-1].bus, fit, there, stub_v)
+            was = _was_at(part, state, rows)
+            moved[load.name] = moved_load(load, stubs[-1].bus, fit, was, stub_v)
     return Folded(
         feeder=_rebuilt(feeder, root_of, stubs, moved),
         buses_before=len(volts),
@@ -139,6 +139,17 @@ def _rows_of_loads(part: FoldedPart) -> list[list[NDArray[np.int64]]]:
         rows = np.flatnonzero(part.branch_load == k)
         own[part.owner[part.branch_from[rows[0]]]].append(rows)
     return own
+
+
+def _was_at(part: FoldedPart, state: Seen, rows: NDArray[np.int64]) -> WasAt:
+    """A load's branches on average; they are equal but for their voltages."""
+    v, nominal_v = float(np.abs(state.branch_v[rows]).mean()), float(part.branch_v[rows[0]])
+    return WasAt(
+        y_s=_mean_y(state, rows),
+        factors=law_factors(part.laws, int(part.branch_load[rows[0]]), v / nominal_v),
+        v=v,
+        nominal_v=nominal_v,
+    )
 
 
 def _mean_y(state: Seen, rows: NDArray[np.int64]) -> complex:

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from ..parts import Feeder, InlineTransformer, Line, LineCode, Load, Place, Regulator, Switch
 from .equivalent import Equivalent, Fit, across
-from .primitives import law_factors
 
-__all__ = ["Stub", "free_name", "moved_load", "names_in", "stub_of"]
+__all__ = ["Stub", "WasAt", "free_name", "moved_load", "names_in", "stub_of"]
 
 Complex = NDArray[np.complex128]
 
@@ -34,29 +33,23 @@ class Stub:
     units: tuple[InlineTransformer, ...] = ()
 
 
-def moved_load(
-    load: Load, bus: str, fit: Fit, there: tuple[complex, float, float], v: Complex
-) -> Load:
-    """Return the load as it stands at ``bus``.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WasAt:
+    """Where a load stood: what its branches were, at the level of the fold."""
 
-    Parameters
-    ----------
-    load : Load
-    bus : str
-    fit : Fit
-    there : complex, float, float
-        Where it stood: the admittance of a branch at its voltage, that voltage, and the nominal
-        one, volts.
-    v : (3,) array
-        Voltages of the phases of ``bus`` at the level of the fold.
-    """
-    y, v_was, v_nominal = there
-    p_factor, q_factor = law_factors(load, v_was / v_nominal)
+    y_s: complex  #: of a branch, at its voltage
+    factors: tuple[float, float]  #: conductance and susceptance there, over the nominal ones
+    v: float  #: of a branch
+    nominal_v: float
+
+
+def moved_load(load: Load, bus: str, fit: Fit, was: WasAt, v: Complex) -> Load:
+    """Return the load as it stands at ``bus``, whose phases have the voltages ``v`` (3,)."""
     here = across(fit.phases, fit.connection)
-    v_now = float(np.abs(here @ v).mean())
     # its own law meets the same voltage in pu as before
-    kv = v_nominal * v_now / v_was / 1000.0
-    y = fit.share * y
+    kv = was.nominal_v * float(np.abs(here @ v).mean()) / was.v / 1000.0
+    y = fit.share * was.y_s
+    p_factor, q_factor = was.factors
     kva = complex(y.real / p_factor, -y.imag / q_factor) * kv**2 * 1000.0 * len(here)
     return replace(
         load,
@@ -65,6 +58,7 @@ def moved_load(
         phases=fit.phases,
         branch_kv=kv,
         kw=max(kva.real, 0.0) if load.kw >= 0.0 else kva.real,
+        power_factor=1.0,
         kvar=kva.imag,
     )
 
