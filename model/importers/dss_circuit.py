@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from .dss_engine import Engine, Props, rows_of
+from .dss_engine import Engine, Props, count_of, rows_of
 from .dss_records import (
     End,
     Matrix,
@@ -58,7 +59,7 @@ _UNREAD = (
 def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) -> RawCircuit:
     """Return what the engine's circuit is made of, disabled elements left out."""
     solution = engine.circuit.Solution
-    return RawCircuit(
+    circuit = RawCircuit(
         name=str(engine.circuit.Name),
         frequency_hz=float(solution.Frequency),
         load_mult=float(solution.LoadMult),
@@ -72,12 +73,18 @@ def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) ->
         guards=tuple(_guard(kind, row) for kind in _GUARDS for row in rows_of(engine, kind)),
         tap_controls=tuple(_tap_control(row) for row in rows_of(engine, "regcontrol")),
         others=tuple(_other(kind, row) for kind in _UNREAD for row in rows_of(engine, kind)),
-        disabled=sum(
-            len(rows_of(engine, kind, disabled=True)) - len(rows_of(engine, kind))
-            for kind in ("line", "transformer", "load", "capacitor", "reactor", *_PLANTS)
-        ),
+        disabled=0,
         coordinates=tuple((bus, x, y) for bus, (x, y) in coordinates.items()),
     )
+    enabled = {
+        "line": circuit.lines,
+        "transformer": circuit.transformers,
+        "load": circuit.loads,
+        "capacitor": circuit.capacitors,
+        "reactor": circuit.reactors,
+    }
+    counted = sum(count_of(engine, kind) - len(parts) for kind, parts in enabled.items())
+    return replace(circuit, disabled=counted)
 
 
 def end_of(text: str, conductors: int, phases: int) -> End:

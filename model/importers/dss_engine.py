@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import Fault, InputError, OpenPhaseError
 from .dss_script import Command
 
-__all__ = ["Engine", "Props", "rows_of", "solved_volts", "start"]
+__all__ = ["Engine", "Props", "count_of", "rows_of", "solved_volts", "start", "tell"]
 
 Props = Mapping[str, Any]
 
@@ -81,23 +81,28 @@ def rows_of(engine: Engine, kind: str, *, disabled: bool = False) -> list[Props]
     return found if isinstance(found, list) else []
 
 
-def solved_volts(
-    engine: Engine, *, mode: str, disabled: Iterable[str] = ()
-) -> tuple[dict[tuple[str, int], complex], bool]:
+def count_of(engine: Engine, kind: str) -> int:
+    """Return how many elements of a class there are, disabled ones too."""
+    engine.circuit.SetActiveClass(kind)
+    return int(engine.circuit.ActiveClass.Count)
+
+
+def tell(engine: Engine, commands: Iterable[str]) -> None:
+    """Hand commands over that were made here, not read from a file."""
+    for command in commands:
+        engine.context.Text.Command = command
+
+
+def solved_volts(engine: Engine, *, mode: str) -> tuple[dict[tuple[str, int], complex], bool]:
     """Let the engine solve, its controls off, and return each node's voltage to earth.
 
     Parameters
     ----------
     mode
         ``snap`` with the loads' own laws, ``direct`` with nominal admittances.
-    disabled
-        Elements that were left out of the import.
     """
-    text = engine.context.Text
-    for element in disabled:
-        text.Command = f'Disable "{element}"'
-    for option in ("controlmode=off", "tolerance=1e-9", "maxiterations=2000", f"mode={mode}"):
-        text.Command = f"Set {option}"
+    options = ("controlmode=off", "tolerance=1e-8", "maxiterations=500", f"mode={mode}")
+    tell(engine, (f"Set {option}" for option in options))
     engine.circuit.Solution.Solve()
     flat = np.asarray(engine.circuit.AllBusVolts, np.float64)
     volts = flat[0::2] + 1j * flat[1::2]

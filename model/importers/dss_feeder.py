@@ -261,6 +261,7 @@ def _add_series(build: _Build) -> None:
             if regulator is not None:
                 name = regulator_names.new(regulator.name)
                 build.regulators.append(replace(regulator, name=name))
+    spans += banks.spans
     kept = [span for span in spans if span.name not in regulated.jumpers]
     build.built = line_parts(kept, circuit.guards, build.buses, findings)
 

@@ -141,7 +141,7 @@ INLINE_TRANSFORMERS: tuple[Field, ...] = (
         unit="pu",
         high=1.0,
         required=True,
-        doc="Leakage, not 0; of `centre-tap` the from-winding's branch of the star, which may be 0.",
+        doc="Leakage, not 0; of `centre-tap` the from-winding's branch of the star, maybe 0.",
     ),
     Field(
         name="leg_leakage_pu",

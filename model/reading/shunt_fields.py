@@ -162,7 +162,16 @@ LOADS: tuple[Field, ...] = (
         unit="pu",
         low=0.0,
         high=2.0,
-        doc="Down to it from `v_min_pu` the impedance goes back to the nominal one, linearly.",
+        doc="Down to it from `v_min_pu` the current goes back to that of the nominal impedance, "
+        "linearly.",
+    ),
+    Field(
+        name="edge_exponent",
+        kind="number",
+        low=0.0,
+        high=10.0,
+        absent="its own law",
+        doc="Beyond `v_min_pu` and `v_max_pu` it goes on from this exponent's value there.",
     ),
     Field(
         name="motor_share",
