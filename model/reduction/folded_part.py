@@ -24,8 +24,6 @@ __all__ = ["FoldedPart", "Seen", "folded_part", "seen_from_roots"]
 
 Complex = NDArray[np.complex128]
 
-ANTI_FLOAT = 1e-11
-"""Share of the largest admittance put from every node to earth, so that none can float."""
 PASSES = 60
 SETTLED_PU = 1e-10
 
@@ -157,13 +155,11 @@ def seen_from_roots(
     Each load's admittance settles at its own voltage, or is that of ``linear_s`` (P,); what the
     root sees is then that of a linear network with these admittances.
     """
-    earth = part.network.diagonal()
-    leak = diags(np.full(earth.shape, ANTI_FLOAT * np.abs(earth).max(initial=1.0)))
     pick = _incidence(part)
     y = part.branch_y_s if linear_s is None else linear_s
     v = np.zeros(y.shape, np.complex128)
     for _ in range(PASSES):
-        inverse = splu(csc_matrix(part.network + leak + pick.T @ diags(level * y) @ pick))
+        inverse = splu(csc_matrix(part.network + pick.T @ diags(level * y) @ pick))
         unit = -inverse.solve(_per_phase(part))
         gain = pick @ unit
         before, v = v, np.einsum("pk,pk->p", gain, root_v[_root_of_branch(part)])
