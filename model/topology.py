@@ -1,20 +1,30 @@
-"""The feeder as a graph: buses joined by lines, switches and regulators."""
+"""The feeder as a graph: buses joined by lines, switches, regulators and transformers."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections import defaultdict, deque
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from .errors import KeyPath
 from .parts import Feeder
 
-__all__ = ["Edge", "Tree", "buses", "edges", "forest", "tree_path"]
+__all__ = [
+    "Edge",
+    "Neighbours",
+    "Tree",
+    "buses",
+    "edges",
+    "forest",
+    "neighbours",
+    "shortest_path",
+    "tree_path",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edge:
-    """A line, switch or regulator in the graph; ``path`` is its key path in the document."""
+    """What joins two buses; ``path`` is its key path in the document."""
 
     path: KeyPath
     name: str
@@ -26,12 +36,15 @@ class Edge:
         return self.path[0] == "lines"
 
 
+Neighbours = Mapping[str, Sequence[tuple[str, Edge]]]
+"""Bus -> the buses next to it, and the edges to them, in the order of the edges."""
+
 Tree = dict[str, tuple[str, Edge] | None]
 """Bus -> the bus before it and the edge between them; None for the root. Depth first."""
 
 
 def edges(feeder: Feeder) -> tuple[Edge, ...]:
-    """Return the lines, the normally closed switches and the regulators, in the feeder's order."""
+    """Return lines, normally closed switches, regulators, transformers, in the feeder's order."""
     lines = (
         Edge(path=("lines", index), name=line.name, ends=(line.from_bus, line.to_bus))
         for index, line in enumerate(feeder.lines)
@@ -45,7 +58,21 @@ def edges(feeder: Feeder) -> tuple[Edge, ...]:
         Edge(path=("regulators", index), name=part.name, ends=(part.from_bus, part.to_bus))
         for index, part in enumerate(feeder.regulators)
     )
-    return (*lines, *switches, *regulators)
+    inline = (
+        Edge(path=("inline_transformers", index), name=unit.name, ends=(unit.from_bus, unit.to_bus))
+        for index, unit in enumerate(feeder.inline_transformers)
+    )
+    return (*lines, *switches, *regulators, *inline)
+
+
+def neighbours(graph: Iterable[Edge]) -> Neighbours:
+    """Return what stands next to every bus."""
+    beside: defaultdict[str, list[tuple[str, Edge]]] = defaultdict(list)
+    for edge in graph:
+        start, end = edge.ends
+        beside[start].append((end, edge))
+        beside[end].append((start, edge))
+    return beside
 
 
 def buses(feeder: Feeder) -> tuple[str, ...]:
@@ -55,21 +82,17 @@ def buses(feeder: Feeder) -> tuple[str, ...]:
 
 def forest(graph: Sequence[Edge], roots: Iterable[str]) -> list[Tree]:
     """Return a spanning tree from every root that no earlier tree reaches, in order."""
-    neighbours: defaultdict[str, list[tuple[str, Edge]]] = defaultdict(list)
-    for edge in graph:
-        start, end = edge.ends
-        neighbours[start].append((end, edge))
-        neighbours[end].append((start, edge))
+    beside = neighbours(graph)
     trees: list[Tree] = []
     reached: set[str] = set()
     for root in roots:
         if root not in reached:
-            trees.append(_spanning_tree(root, neighbours))
+            trees.append(_spanning_tree(root, beside))
             reached.update(trees[-1])
     return trees
 
 
-def _spanning_tree(root: str, neighbours: dict[str, list[tuple[str, Edge]]]) -> Tree:
+def _spanning_tree(root: str, beside: Neighbours) -> Tree:
     """Return the tree of all buses reached from the root, branches in the order of the edges."""
     tree: Tree = {}
     waiting: list[tuple[str, tuple[str, Edge] | None]] = [(root, None)]
@@ -78,7 +101,7 @@ def _spanning_tree(root: str, neighbours: dict[str, list[tuple[str, Edge]]]) -> 
         if bus in tree:
             continue
         tree[bus] = before
-        for neighbour, edge in reversed(neighbours.get(bus, [])):
+        for neighbour, edge in reversed(beside.get(bus, [])):
             waiting.append((neighbour, (bus, edge)))
     return tree
 
@@ -91,6 +114,24 @@ def tree_path(tree: Tree, start: str, end: str) -> tuple[list[str], list[Edge]]:
         up_edges.pop(), down_edges.pop()
         up.pop(), down.pop()
     return [*up, *reversed(down[:-1])], [*up_edges, *reversed(down_edges)]
+
+
+def shortest_path(beside: Neighbours, start: str, end: str) -> tuple[list[str], list[Edge]]:
+    """Return the buses and the edges of the way of fewest edges, ``start`` first.
+
+    Among ways as short it is the one that comes first in the order of the edges. In a tree it
+    is the only one. Raises KeyError where there is none.
+    """
+    before: Tree = {start: None}
+    waiting = deque([start])
+    while waiting and end not in before:
+        bus = waiting.popleft()
+        for far, edge in beside.get(bus, []):
+            if far not in before:
+                before[far] = bus, edge
+                waiting.append(far)
+    passed, taken = _to_root(before, end)
+    return passed[::-1], taken[::-1]
 
 
 def _to_root(tree: Tree, bus: str) -> tuple[list[str], list[Edge]]:

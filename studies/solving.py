@@ -239,7 +239,7 @@ def _sections(
     judged = [own.options for own in settings.values() if own is not None]
     shown = Options(fallback=True, compensated=True)
     evidence = evidence_of(
-        _phasors(points, frames), points.terminals, network.tree.v_nominal_v, shown, *judged
+        _phasors(points, frames), points.terminals, points.v_nominal_v, shown, *judged
     )
     rows = []
     for t, terminal in enumerate(points.terminals):

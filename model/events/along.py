@@ -21,7 +21,7 @@ def draw_node(
     """(S,) the nodes nearest to places drawn as for any other event."""
     edge, share = draw_place(rng, size, regions)
     tree = network.tree
-    # the chord, the last edge, is no node's own: it leads from the tail to the fork
+    # chords, the last edges, are no node's own: they lead from tails to forks
     upper = np.append(tree.parent, tree.tail)[edge]
     lower = np.append(np.arange(tree.parent.size), tree.fork)[edge]
     return np.where(share < 0.5, upper, lower)
@@ -38,6 +38,6 @@ def fed_through(network: Network, edge: Int, nodes: Int) -> NDArray[np.bool_]:
     for k in range(below.size - 1, 0, -1):
         below[tree.parent[k]] += below[k]
     own = np.where((edge > 0) & (edge < below.size), edge, 0)
-    only = (own > 0) & ~tree.in_loop[own]
+    only = (own > 0) & ~tree.carried.any(axis=1)[own]
     after = nodes[:, None] - own
     return np.asarray(only & (after >= 0) & (after < below[own]))

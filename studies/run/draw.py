@@ -129,7 +129,9 @@ def _draw_states(rng: np.random.Generator, case: Case, size: int) -> tuple[State
     shape = (len(network.loads), size)
     scale = scalars["loads.level"] * study.loads.each.draw(rng, shape)
     spread = rng.uniform(-study.loads.exponent_spread, study.loads.exponent_spread, shape)
-    exponent = np.clip(scalars["loads.exponent"] + spread, 0.0, 2.0)
+    # where the study leaves it to the file, each load follows its own law there
+    common = scalars.get("loads.exponent")
+    exponent = np.full(shape, OWN_LAW) if common is None else np.clip(common + spread, 0.0, 2.0)
     source_change = scalars["ambient.source_pct"] / 100.0
     load_change = rng.uniform(-study.ambient.load_pct, study.ambient.load_pct, shape) / 100.0
     machines = _machine_draws(case, scalars, size)

@@ -85,7 +85,7 @@ def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
     point, kind = scenarios.miswired
     if kind.any():
         phasors = miswire(phasors, point, kind)
-    terminals, v_nominal_v = case.points.terminals, case.network.tree.v_nominal_v
+    terminals, v_nominal_v = case.points.terminals, case.points.v_nominal_v
     evidence = evidence_of(phasors, terminals, v_nominal_v, *options)
     # of the state before the event; behind generation power may flow either way
     one_way = fed_one_way(first.points.terminals) & (not case.feeder.ders)
