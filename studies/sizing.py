@@ -94,7 +94,9 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     validations = validate(cases, rivals, attempt, folder, demand.jobs)
     watch.lap("validate_s")
     sheets = sheets_of(cases, validations, attempt.number, chosen=True)
-    answer = answer_head(cases, attempt) | certified(sheets, given, rivals)
+    answer = answer_head(cases, attempt) | certified(
+        sheets, given, rivals, sum(own.flags for own in trainings)
+    )
     sizing = Sizing(result=answer, cases=cases, trainings=trainings, validations=validations)
     folder.write("result.json", as_json(answer))
     folder.write("settings.csv", settings_csv(answer))

@@ -23,9 +23,10 @@ def draw_earth_fault(
     regions: Sequence[Places],
     ohm: Distribution,
 ) -> Event:
-    """A fault of ``ohm`` appears or, as likely, clears; every region as likely,
-    and every phase that the line has.
-   """
+    """A fault of ``ohm`` appears or, as likely, clears.
+
+    Every region is as likely, and every phase that the line has.
+    """
     edge, share = draw_place(rng, size, regions)
     y = 1.0 / np.maximum(ohm.draw(rng, size), LEAST_OHM)
     earth = np.where(row_flags(draw_phase(rng, network.tree.phases[edge])), y, 0j)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,8 @@ from ...model.distributions import Choices
 from ...model.events.base import Places, places_on
 from ...model.network import CONNECTIONS, Network, compile_network
 from ...model.parts import Feeder
-from ...model.points import Points, Terminal, find_points
+from ...model.points import Points, find_points
+from ...model.sides import edge_nodes
 from ...optimise.counts import Grid
 from ..spec.events import CLASSES, SwitchState
 from ..spec.parts import UNKNOWN_CONNECTION
@@ -20,7 +21,10 @@ from ..spec.parts import Group as GroupSpec
 from ..spec.study_file import Study
 from .classes import DrawClass
 
-__all__ = ["Case", "Group", "Wired", "make_case", "make_cases"]
+__all__ = ["Case", "Group", "Sites", "Wired", "make_case", "make_cases"]
+
+LOW_VOLTAGE_V = 1000.0 / 3.0**0.5  #: phase to earth; up to 1 kV between phases, IEC 60038
+SAME = 1e-6  #: relative difference of nominal voltages that are the same
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +44,19 @@ class Wired:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sites:
+    """Lines of medium voltage on which events of a class may stand."""
+
+    lines: Places  #: all of them, for breaks
+    regions: tuple[Places, ...]  #: of each section, and those in none
+
+    @property
+    def edges(self) -> NDArray[np.int64]:
+        """All the edges."""
+        return self.lines.edges
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Case:
     """A feeder and a study in one network state: everything that a block needs."""
 
@@ -50,8 +67,7 @@ class Case:
     points: Points
     ties: tuple[Wired, ...]  #: states that tie switching goes to and comes from
     transfers: tuple[Wired, ...]  #: and transfers
-    lines: Places  #: every line, for breaks
-    regions: tuple[Places, ...]  #: each section's lines, and those in none
+    places: Mapping[int, Sites]  #: on lines of at least so many phases
     yg_d_units: NDArray[np.int64]  #: units that may be Yg/D, in order
     unknown_units: NDArray[np.int64]  #: units whose connection is drawn
     unknown_choices: Choices
@@ -117,8 +133,7 @@ def _case(
         points=wired.points,
         ties=ties,
         transfers=transfers,
-        lines=places_on(network),
-        regions=_regions(network, wired.points.terminals),
+        places={least: _sites(network, wired.points, least) for least in (1, 2, 3)},
         yg_d_units=np.array([units.index(name) for name in study.transformers.yg_d], np.int64),
         unknown_units=np.array(unknown, np.int64),
         unknown_choices=choices,
@@ -150,11 +165,24 @@ def _others(
     return tuple(state for state in wired if key(state) != key(own))
 
 
-def _regions(network: Network, terminals: tuple[Terminal, ...]) -> tuple[Places, ...]:
-    sections = [terminal.in_section for terminal in terminals[::2]]
-    rest = ~np.any(sections, axis=0)
-    regions = [places_on(network, chosen) for chosen in [*sections, rest]]
-    return tuple(region for region in regions if region.edges.size)
+def _sites(network: Network, points: Points, least_phases: int) -> Sites:
+    """Lines of medium voltage with at least so many phases."""
+    medium = _medium_voltage(network, points)
+    sections = [terminal.in_section & medium for terminal in points.terminals[::2]]
+    rest = medium & ~np.any(sections, axis=0)
+    regions = [places_on(network, chosen, least_phases) for chosen in [*sections, rest]]
+    return Sites(
+        lines=places_on(network, medium, least_phases),
+        regions=tuple(region for region in regions if region.edges.size),
+    )
+
+
+def _medium_voltage(network: Network, points: Points) -> NDArray[np.bool_]:
+    """(edges,) at a measuring point's nominal voltage, or between low voltage and theirs."""
+    _, lower = edge_nodes(network)
+    v, own = network.node_v[lower], points.v_nominal_v
+    between = (v >= LOW_VOLTAGE_V) & (v <= own.max(initial=0.0) * (1.0 + SAME))
+    return np.asarray(between | np.isclose(v[:, None], own, rtol=SAME, atol=0.0).any(axis=1))
 
 
 def _drawn(feeder: Feeder, study: Study, ties: bool, transfers: bool) -> tuple[DrawClass, ...]:

@@ -39,6 +39,7 @@ class Trained:
     front: tuple[Front, ...]  #: of the same events
     trials: Int  #: (R, T) per reported class
     reachable: Int  #: (T,)
+    flags: Int  #: (3,) scenarios dead, floating, not converged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,6 +56,7 @@ class Tested:
     missed: Int  #: (T, Reason) of these, by the criterion that failed
     profile: Int  #: (T, PLACES, 2) internal breaks along the section: all, found
     front: tuple[Front, ...]  #: false trips of the chosen setting, per terminal
+    least_z_ohm: NDArray[np.float64]  #: (T,) smallest |Z1| of these, see ``_least_z``
     flags: Int  #: (3,) scenarios dead, floating, not converged
     verdicts: NDArray[np.uint8]  #: (T, S) what the first setting said, as ``pack_verdicts``
     sample: NDArray[np.float64]  #: (T, 5, KEPT) as ``_sample`` has it
@@ -88,6 +90,7 @@ def train_block(case: Case, which: BlockId, size: int = BLOCK) -> Trained:
         front=tuple(front),
         trials=_counted(rows),
         reachable=_reachable(rows, seen).sum(axis=1),
+        flags=_flags(seen),
     )
 
 
@@ -124,7 +127,8 @@ def judge_block(
         front=tuple(
             _false_trips(reach[t], rows[t], trip[0, t], _identity(which, size)) for t in terminals
         ),
-        flags=np.array([(seen.flags & bit != 0).sum() for bit in (DEAD, FLOATING, NOT_CONVERGED)]),
+        least_z_ohm=np.array([_least_z(seen, t, settings[t][0], reachable[t]) for t in terminals]),
+        flags=_flags(seen),
         verdicts=pack_verdicts(reason[0], seen.side, seen.connected),
         sample=np.stack(
             [_sample(reach[t], np.abs(evidence.z1_ohm[t]), reason[0, t]) for t in terminals]
@@ -183,6 +187,21 @@ def _fallen(drawn: DrawClass, seen: Observed, trip: Flags) -> Int:
 def _alarmed(seen: Observed) -> Flags:
     alarm = seen.evidence.alarm
     return np.zeros(seen.side.shape, np.bool_) if alarm is None else alarm != 0
+
+
+def _flags(seen: Observed) -> Int:
+    """(3,): scenarios with a dead conductor, a floating island, or without a solution."""
+    return np.array([(seen.flags & bit != 0).sum() for bit in (DEAD, FLOATING, NOT_CONVERGED)])
+
+
+def _least_z(seen: Observed, t: int, chosen: Settings | None, reachable: Flags) -> float:
+    """Smallest |Z1| of the breaks in which I_set and V_set leave it to Z_set; inf: of none."""
+    if chosen is None:
+        return float("inf")
+    own = seen.evidence
+    left = reachable & (seen.flags & NOT_CONVERGED == 0) & ~own.blocked[t] & ~own.undefined[t, 0]
+    left &= (own.di1_a[t] >= chosen.i_set_a) & (own.dv1_pu[t] <= chosen.v_set_pu)
+    return float(np.abs(own.z1_ohm[t, left]).min(initial=np.inf))
 
 
 def _reach(seen: Observed, t: int, chosen: Settings | None) -> Reach:
