@@ -10,9 +10,12 @@ from .errors import InputError, OpenPhaseError
 from .feeder import make_feeder
 from .parts import (
     Capacitor,
+    Coordinates,
     Der,
     Feeder,
+    InlineTransformer,
     Line,
+    LineCode,
     Load,
     Place,
     Point,
@@ -28,14 +31,18 @@ from .reading.feeder_file import (
     load_feeder,
     read_feeder,
     shipped_feeders,
+    write_feeder,
 )
 
 __all__ = [
     "Capacitor",
+    "Coordinates",
     "Der",
     "Feeder",
+    "InlineTransformer",
     "InputError",
     "Line",
+    "LineCode",
     "Load",
     "OpenPhaseError",
     "Place",
@@ -51,4 +58,5 @@ __all__ = [
     "make_feeder",
     "read_feeder",
     "shipped_feeders",
+    "write_feeder",
 ]

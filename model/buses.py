@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 
-from .line_matrices import phase_mask
-from .parts import Feeder, InlineTransformer
+from .parts import Feeder, InlineTransformer, Regulator
+from .phases import conductors, phase_mask
 
-__all__ = ["bus_phases", "bus_volts", "to_side_volts"]
+__all__ = ["bus_phases", "bus_volts", "fed_backwards", "to_side_volts"]
 
 ROOT = 3.0**0.5
 
@@ -30,6 +30,15 @@ def _from_side_volts(unit: InlineTransformer) -> float:
 
 def bus_volts(feeder: Feeder) -> dict[str, float]:
     """Nominal phase-to-earth volts of every bus, all switches taken as closed."""
+    return _volts(feeder)[0]
+
+
+def fed_backwards(feeder: Feeder) -> set[str]:
+    """In-line transformers whose to-side it is that gives their from-side its nominal volts."""
+    return _volts(feeder)[1]
+
+
+def _volts(feeder: Feeder) -> tuple[dict[str, float], set[str]]:
     joined: defaultdict[str, list[tuple[str, InlineTransformer | None, bool]]] = defaultdict(list)
     for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
         joined[part.from_bus].append((part.to_bus, None, True))
@@ -38,6 +47,7 @@ def bus_volts(feeder: Feeder) -> dict[str, float]:
         joined[unit.from_bus].append((unit.to_bus, unit, True))
         joined[unit.to_bus].append((unit.from_bus, unit, False))
     volts = {feeder.source.bus: feeder.source.v_phase_v}
+    backwards: set[str] = set()
     waiting = deque([feeder.source.bus])
     while waiting:
         bus = waiting.popleft()
@@ -47,15 +57,16 @@ def bus_volts(feeder: Feeder) -> dict[str, float]:
             volts[far] = volts[bus]
             if inline is not None:
                 volts[far] = to_side_volts(inline) if onwards else _from_side_volts(inline)
+                backwards.update([] if onwards else [inline.name])
             waiting.append(far)
-    return volts
+    return volts, backwards
 
 
 def bus_phases(feeder: Feeder) -> dict[str, int]:
     """Bit mask of the phases that reach every bus from the source, all switches closed."""
     joined: defaultdict[str, list[tuple[str, int, int]]] = defaultdict(list)
     for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
-        mask = phase_mask(part.phases)
+        mask = phase_mask(conductors(part) if isinstance(part, Regulator) else part.phases)
         joined[part.from_bus].append((part.to_bus, mask, 0))
         joined[part.to_bus].append((part.from_bus, mask, 0))
     for unit in feeder.inline_transformers:

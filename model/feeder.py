@@ -1,8 +1,8 @@
 """The door through which every feeder comes: all its parts checked, alone and together.
 
 A `Feeder` that came through `make_feeder` or `checked_feeder` has unique names, no loose
-reference, parts that the model can represent, and a graph that is a tree while its ties
-are open.
+reference, parts that the model can represent, and a source that reaches every bus, with every
+phase that something there needs, while its ties are open.
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ from pathlib import Path
 from .errors import Report
 from .parts import (
     Capacitor,
+    Coordinates,
     Der,
     Feeder,
+    InlineTransformer,
     Line,
+    LineCode,
     Load,
     Point,
     Regulator,
@@ -28,6 +31,7 @@ from .reading.feeder_document import document_from_feeder, feeder_from_document
 from .reading.feeder_electrical import check_electrical
 from .reading.feeder_graph import check_graph, check_section_paths, graph_is_known
 from .reading.feeder_names import STUB_SUFFIXES, check_ends, check_names, check_references
+from .reading.feeder_phases import check_phases, check_volts
 from .reading.feeder_tables import with_csv_tables
 from .topology import buses
 
@@ -47,6 +51,9 @@ def make_feeder(  # noqa: PLR0913 - one argument for each field of Feeder
     switches: Sequence[Switch] = (),
     points: Sequence[Point] = (),
     sections: Sequence[Section] = (),
+    codes: Sequence[LineCode] = (),
+    inline_transformers: Sequence[InlineTransformer] = (),
+    coordinates: Sequence[Coordinates] = (),
     imported_from: str | None = None,
 ) -> Feeder:
     """Return a feeder built in a program, checked like one from a file.
@@ -71,6 +78,9 @@ def make_feeder(  # noqa: PLR0913 - one argument for each field of Feeder
         switches=tuple(switches),
         points=tuple(points),
         sections=tuple(sections),
+        codes=tuple(codes),
+        inline_transformers=tuple(inline_transformers),
+        coordinates=tuple(coordinates),
         imported_from=imported_from,
     )
     document = document_from_feeder(feeder)
@@ -100,6 +110,8 @@ def checked_feeder(report: Report, folder: Path | None = None) -> Feeder:
     check_electrical(feeder, report)
     if graph_is_known(report):
         check_graph(feeder, report)
+        check_phases(feeder, report)
+        check_volts(feeder, report)
     if not report.faults:
         check_section_paths(feeder, report)
     report.raise_if_any()

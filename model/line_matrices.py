@@ -6,22 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .parts import Feeder, Line, LineCode
+from .phases import phase_mask, phase_rows
 from .symmetrical import phase_matrix
 
 __all__ = ["phase_mask", "phase_rows", "shunt_nf_per_km", "z1_ohm", "z_ohm_per_km"]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-
-
-def phase_rows(phases: str) -> list[int]:
-    """Rows of the phases, in their order: ``"ca"`` is ``[2, 0]``."""
-    return ["abc".index(phase) for phase in phases]
-
-
-def phase_mask(phases: str) -> int:
-    """Bit mask of the phases, bit 0 for a."""
-    return sum(1 << row for row in phase_rows(phases))
 
 
 def z_ohm_per_km(feeder: Feeder, line: Line) -> Complex:

@@ -9,18 +9,18 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..errors import KeyPath, Report
 from .fields import Field, describe_field, did_you_mean
 from .table_check import REPORTED, reason
 
-__all__ = ["CsvTable", "columns_of", "parse_csv"]
+__all__ = ["CsvTable", "columns_of", "parse_csv", "ways_of"]
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _INTEGER = re.compile(r"[+-]?\d{1,300}")
-_POLAR = ("mag", "deg")
+_POLAR, _RECTANGULAR = ("mag", "deg"), ("r", "x")
 
 
 @dataclass(slots=True, kw_only=True)
@@ -47,21 +47,34 @@ class CsvTable:
             report.add(path, wanted, found)
 
 
-def columns_of(fields: Sequence[Field]) -> dict[str, tuple[Field, str]]:
-    """Return the columns a table may have: the field of each, and which part of it.
+def ways_of(own: Field) -> tuple[tuple[str, ...], ...]:
+    """Return the columns of a field, all of them needed; several ways where there is a choice.
 
     Examples
     --------
-    >>> columns_of([Field(name="z_ohm", kind="impedance", doc="")]).keys()
-    dict_keys(['z_ohm.mag', 'z_ohm.deg'])
+    >>> ways_of(Field(name="z_ohm", kind="impedance", doc=""))
+    (('z_ohm.mag', 'z_ohm.deg'), ('z_ohm.r', 'z_ohm.x'))
+    >>> ways_of(Field(name="ab", kind="numbers", count=2, doc=""))
+    (('ab.1', 'ab.2'),)
     """
-    columns: dict[str, tuple[Field, str]] = {}
-    for own in fields:
-        if own.kind == "impedance":
-            columns |= {f"{own.name}.{part}": (own, part) for part in _POLAR}
-        else:
-            columns[own.name] = (own, "")
-    return columns
+    if own.kind == "impedance":
+        ways: tuple[Sequence[str], ...] = (_POLAR, _RECTANGULAR)
+    elif own.kind in ("numbers", "integers") and own.count is not None:
+        ways = ([str(n + 1) for n in range(own.count)],)
+    else:
+        return ((own.name,),)
+    return tuple(tuple(f"{own.name}.{part}" for part in way) for way in ways)
+
+
+def columns_of(fields: Sequence[Field]) -> dict[str, Field]:
+    """Return the columns a table may have, and the field of each.
+
+    Examples
+    --------
+    >>> list(columns_of([Field(name="z_ohm", kind="impedance", doc="")]))
+    ['z_ohm.mag', 'z_ohm.deg', 'z_ohm.r', 'z_ohm.x']
+    """
+    return {column: own for own in fields for way in ways_of(own) for column in way}
 
 
 def parse_csv(
@@ -127,6 +140,7 @@ def _fill(
 ) -> None:
     """Add the rows that the lines below the column names hold; lines without text hold none."""
     absent = [own.name for own in fields if not _is_whole(head, own)]
+    columns = columns_of(fields)
     for number, line in lines:
         cells = _without_tail(line, len(head))
         if not any(cells):
@@ -134,12 +148,10 @@ def _fill(
         path = (table, len(found.rows))
         found.lines[path] = number
         if len(cells) == len(head):
-            row = {**_row(head, cells, fields), **dict.fromkeys(absent, REPORTED)}
+            row = {**_row(head, cells, columns), **dict.fromkeys(absent, REPORTED)}
             for name, value in row.items():
-                if isinstance(value, dict) and len(value) < len(_POLAR):
-                    rule = f"must have both cells, {name}.mag and {name}.deg, or none"
-                    found.faults.append(((*path, name), rule, None))
-                    row[name] = REPORTED
+                if isinstance(value, _Cells):
+                    row[name] = _joined(value, (*path, name), found)
             found.rows.append(row)
         else:
             rule = f"must have {len(head)} cells, as many as there are columns"
@@ -182,9 +194,10 @@ def _has(head: Sequence[str], own: Field) -> bool:
 
 def _is_whole(head: Sequence[str], own: Field) -> bool:
     """Whether the field has the columns it needs, or none and may have none."""
-    if _has(head, own):
-        return all(column in head for column in columns_of([own]))
-    return not own.required
+    if not _has(head, own):
+        return not own.required
+    begun = [way for way in ways_of(own) if any(column in head for column in way)]
+    return len(begun) == 1 and all(column in head for column in begun[0])
 
 
 def _check_head(
@@ -196,7 +209,7 @@ def _check_head(
 ) -> None:
     """Report columns that are unknown, doubled, halved, nameless or missing."""
     columns = columns_of(fields)
-    impedances = {own.name for own in fields if own.kind == "impedance"}
+    parted = {own.name: ways_of(own) for own in fields if len(ways_of(own)[0]) > 1}
 
     def fault(column: str, rule: str, text: str | None = None) -> None:
         path = (table, column) if column else (table,)
@@ -208,8 +221,9 @@ def _check_head(
             fault("", "must have a name for every column", f"none for column {index + 1}")
         elif column in head[:index]:
             fault(column, "must stand in one column only")
-        elif column in impedances:
-            fault(column, f"must be two columns, {column}.mag and {column}.deg")
+        elif column in parted:
+            rule = f"must be {_count(parted[column][0])} columns, {_listed(parted[column][0])}"
+            fault(column, rule)
         elif column not in columns:
             why = reason(column, refused)
             fault(
@@ -217,34 +231,79 @@ def _check_head(
                 f"is not a known column{f': {why}' if why else did_you_mean(column, columns)}",
             )
     for own in fields:
-        halves = [f"{own.name}.{part}" for part in _POLAR]
-        there = [half for half in halves if half in head]
-        if own.kind == "impedance" and len(there) == 1:
-            other = next(half for half in halves if half not in head)
-            fault(there[0], f"must have the column {other} beside it")
-        elif own.required and not _has(head, own):
+        _check_parts(head, own, fault)
+        if own.required and not _has(head, own):
             fault(own.name, f"is missing, a column ({describe_field(own)})")
 
 
-def _row(head: Sequence[str], cells: Sequence[str], fields: Sequence[Field]) -> dict[str, object]:
+def _check_parts(head: Sequence[str], own: Field, fault: Callable[[str, str], None]) -> None:
+    """Report a field of several columns that has some of them, or those of two ways."""
+    begun = [way for way in ways_of(own) if any(column in head for column in way)]
+    if len(begun) > 1:
+        first, second = (next(c for c in way if c in head) for way in begun)
+        fault(second, f"must be left out beside {first}")
+        return
+    for way in begun:
+        lacking = [column for column in way if column not in head]
+        if lacking:
+            there = next(column for column in way if column in head)
+            what = "column" if len(lacking) == 1 else "columns"
+            fault(there, f"must have the {what} {_listed(lacking)} beside it")
+
+
+_COUNTS = {2: "two", 3: "three", 6: "six"}
+
+
+def _count(items: Sequence[str]) -> str:
+    return _COUNTS.get(len(items), str(len(items)))
+
+
+def _listed(items: Sequence[str]) -> str:
+    """Return ``a, b and c``."""
+    return " and ".join(filter(None, (", ".join(items[:-1]), items[-1])))
+
+
+@dataclass(slots=True, kw_only=True)
+class _Cells:
+    """The cells of one field that has several columns."""
+
+    own: Field
+    by_column: dict[str, object] = field(default_factory=dict)
+
+
+def _row(
+    head: Sequence[str], cells: Sequence[str], columns: Mapping[str, Field]
+) -> dict[str, object]:
     """Return the values of a row; empty cells and unknown columns have none."""
-    columns = columns_of(fields)
     row: dict[str, object] = {}
     for column, cell in zip(head, cells, strict=True):
         if cell and column in columns:
-            own, part = columns[column]
-            if part:
-                polar = row.setdefault(own.name, {})
-                assert isinstance(polar, dict)
-                polar[part] = _value(cell, own)
-            else:
+            own = columns[column]
+            if column == own.name:
                 row[own.name] = _value(cell, own)
+            else:
+                parts = row.setdefault(own.name, _Cells(own=own))
+                assert isinstance(parts, _Cells)
+                parts.by_column[column] = _value(cell, own)
     return row
+
+
+def _joined(cells: _Cells, path: KeyPath, found: CsvTable) -> object:
+    """Return the value that several cells make, as TOML would give it."""
+    there = cells.by_column
+    way = next(way for way in ways_of(cells.own) if not there.keys().isdisjoint(way))
+    if any(column not in there for column in way):
+        both = "both" if len(way) == 2 else "all"
+        found.faults.append((path, f"must have {both} cells, {_listed(way)}, or none", None))
+        return REPORTED
+    if way == ways_of(cells.own)[0] and cells.own.kind == "impedance":
+        return {part: there[f"{cells.own.name}.{part}"] for part in _POLAR}
+    return [there[column] for column in way]
 
 
 def _value(cell: str, own: Field) -> object:
     """Return a cell as TOML would give it; as text where it is no value of the field's kind."""
-    if own.kind in ("number", "integer", "impedance"):
+    if own.kind in ("number", "numbers", "integer", "integers", "impedance"):
         if _INTEGER.fullmatch(cell):
             return int(cell)
         return float(cell) if _NUMBER.fullmatch(cell) else cell

@@ -12,9 +12,12 @@ from typing import Any
 from ..errors import KeyPath, Report
 from ..parts import (
     Capacitor,
+    Coordinates,
     Der,
     Feeder,
+    InlineTransformer,
     Line,
+    LineCode,
     Load,
     Place,
     Point,
@@ -35,7 +38,9 @@ __all__ = ["document_from_feeder", "feeder_from_document"]
 _Row = dict[str, Any]
 
 _PARTS: dict[str, type] = {
+    "codes": LineCode,
     "lines": Line,
+    "inline_transformers": InlineTransformer,
     "transformers": Transformer,
     "loads": Load,
     "ders": Der,
@@ -44,6 +49,7 @@ _PARTS: dict[str, type] = {
     "switches": Switch,
     "points": Point,
     "sections": Section,
+    "coordinates": Coordinates,
 }
 
 _RENAMED = {"from": "from_bus", "to": "to_bus"}
@@ -75,7 +81,7 @@ def feeder_from_document(document: Mapping[str, object], report: Report) -> Feed
             if REPORTED not in raw.values():
                 _check_place(row, ways, (table, index), report)
     for index, raw in enumerate(top["loads"]):
-        _check_load_connection(raw, ("loads", index), report)
+        _check_behind_transformer(raw, ("loads", index), report)
     origins = find_origins(
         {"source": [top["source"] or {}], **{table: top[table] for table in ROWS}},
         {"source": [source], **rows},
@@ -106,11 +112,20 @@ def _check_place(row: _Row, allowed: Sequence[set[str]], path: KeyPath, report: 
         report.add(path, f"must say where it hangs, by {ways}", " and ".join(given) or "none")
 
 
-def _check_load_connection(raw: Mapping[str, object], path: KeyPath, report: Report) -> None:
-    """Report a connection where the winding above the load decides it."""
-    if "transformer" in raw and "connection" in raw and REPORTED not in raw.values():
-        rule = "must be left out behind a transformer, whose winding decides"
-        report.add((*path, "connection"), rule)
+def _check_behind_transformer(
+    raw: Mapping[str, object], path: KeyPath, report: Report
+) -> None:
+    """Report what a load says of itself where the transformer above it decides that."""
+    if "transformer" not in raw or REPORTED in raw.values():
+        return
+    decided = {
+        "connection": "whose winding decides",
+        "phases": "whose loads have three",
+        "branch_kv": "whose loads have its nominal voltage",
+    }
+    for key, why in decided.items():
+        if key in raw:
+            report.add((*path, key), f"must be left out behind a transformer, {why}")
 
 
 def _source(row: _Row) -> Source:
@@ -165,7 +180,7 @@ def _value(part: object, field: Field) -> object:
 
 
 def _plain(value: object) -> object:
-    """Return a value as a file holds it: impedances and tuples are lists there."""
+    """Return a value as a file holds it: impedances, tuples and matrices are lists there."""
     if isinstance(value, complex):
         return [value.real, value.imag]
-    return list(value) if isinstance(value, tuple) else value
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from . import feeder_refused as refused
 from .fields import Field
+from .series_fields import CODES, INLINE_TRANSFORMERS, LINES, REGULATORS, SWITCHES
 from .shunt_fields import CAPACITORS, DERS, LOADS, TRANSFORMERS
 
 __all__ = ["CSV_TABLES", "DOCUMENT", "FORMAT", "ROWS", "TABLES"]
@@ -28,7 +29,14 @@ DOCUMENT: tuple[Field, ...] = (
     ),
     Field(name="tables", kind="table", default={}, doc="Tables that stand in CSV files."),
     Field(name="source", kind="table", required=True, doc="The utility source."),
+    Field(name="codes", kind="tables", default=(), doc="Line codes: matrices per km."),
     Field(name="lines", kind="tables", required=True, doc="Lines; their ends make the buses."),
+    Field(
+        name="inline_transformers",
+        kind="tables",
+        default=(),
+        doc="Transformers between two buses, with whatever network lies behind them.",
+    ),
     Field(name="transformers", kind="tables", default=(), doc="Distribution transformers."),
     Field(name="loads", kind="tables", default=(), doc="Loads."),
     Field(name="ders", kind="tables", default=(), doc="Distributed generation."),
@@ -37,9 +45,20 @@ DOCUMENT: tuple[Field, ...] = (
     Field(name="switches", kind="tables", default=(), doc="Switches; an open one is a tie."),
     Field(name="points", kind="tables", default=(), doc="Measuring points."),
     Field(name="sections", kind="tables", default=(), doc="Pairs of points that exchange phasors."),
+    Field(name="coordinates", kind="tables", default=(), doc="Where buses are drawn."),
 )
 
-CSV_TABLES = ("lines", "transformers", "loads", "ders", "capacitors", "switches", "points")
+CSV_TABLES = (
+    "lines",
+    "inline_transformers",
+    "transformers",
+    "loads",
+    "ders",
+    "capacitors",
+    "switches",
+    "points",
+    "coordinates",
+)
 """The tables that may stand in a CSV file: long ones, whose values fit into cells."""
 
 SOURCE: tuple[Field, ...] = (
@@ -51,7 +70,7 @@ SOURCE: tuple[Field, ...] = (
         above=0.0,
         high=1000.0,
         required=True,
-        doc="Nominal line-to-line voltage, to which every impedance is referred.",
+        doc="Nominal line-to-line voltage, of every bus that no in-line transformer parts from it.",
     ),
     Field(
         name="emf_pu",
@@ -61,6 +80,15 @@ SOURCE: tuple[Field, ...] = (
         high=2.0,
         default=1.0,
         doc="EMF on `kv_ll`.",
+    ),
+    Field(
+        name="angle_deg",
+        kind="number",
+        unit="deg",
+        low=-360.0,
+        high=360.0,
+        default=0.0,
+        doc="Angle of phase a of the EMF.",
     ),
     Field(
         name="z1_ohm",
@@ -117,84 +145,6 @@ SOURCE: tuple[Field, ...] = (
     ),
 )
 
-LINES: tuple[Field, ...] = (
-    Field(name="name", kind="name", required=True, doc="Not ending in `.p` or `.q`."),
-    Field(name="from", kind="name", required=True, doc="Bus that fractions are counted from."),
-    Field(name="to", kind="name", required=True, doc="Bus at the other end."),
-    Field(
-        name="length_km", kind="number", unit="km", above=0.0, required=True, doc="Route length."
-    ),
-    Field(
-        name="z1_ohm_per_km",
-        kind="impedance",
-        unit="ohm/km",
-        above=0.0,
-        required=True,
-        doc="Positive-sequence series impedance.",
-    ),
-    Field(
-        name="z0_ohm_per_km",
-        kind="impedance",
-        unit="ohm/km",
-        above=0.0,
-        required=True,
-        doc="Zero-sequence series impedance.",
-    ),
-    Field(
-        name="c1_nf_per_km",
-        kind="number",
-        unit="nF/km",
-        low=0.0,
-        default=0.0,
-        doc="Positive-sequence charging.",
-    ),
-    Field(
-        name="c0_nf_per_km",
-        kind="number",
-        unit="nF/km",
-        low=0.0,
-        default=0.0,
-        doc="Zero-sequence charging, at most `c1_nf_per_km`.",
-    ),
-)
-
-REGULATORS: tuple[Field, ...] = (
-    Field(name="name", kind="name", required=True, doc="The regulator's name."),
-    Field(name="from", kind="name", required=True, doc="Bus whose voltage it steps."),
-    Field(name="to", kind="name", required=True, doc="Bus that gets the stepped voltage."),
-    Field(
-        name="taps",
-        kind="integers",
-        count=3,
-        default=(0, 0, 0),
-        doc="Tap positions of phases a, b, c; `to` has 1 + tap x `step_pct` / 100 of `from`.",
-    ),
-    Field(
-        name="step_pct",
-        kind="number",
-        unit="%",
-        above=0.0,
-        high=5.0,
-        default=0.625,
-        doc="Voltage of one tap.",
-    ),
-    Field(
-        name="most_taps",
-        kind="integer",
-        low=1,
-        high=100,
-        default=16,
-        doc="Farthest tap position, up and down.",
-    ),
-)
-
-SWITCHES: tuple[Field, ...] = (
-    Field(name="name", kind="name", required=True, doc="The switch's name."),
-    Field(name="from", kind="name", required=True, doc="Bus on one side."),
-    Field(name="to", kind="name", required=True, doc="Bus on the other side."),
-    Field(name="closed", kind="flag", default=False, doc="Its normal state."),
-)
-
 POINTS: tuple[Field, ...] = (
     Field(name="name", kind="name", required=True, doc="The point's name."),
     Field(name="bus", kind="name", required=True, doc="The end of `line` that it stands at."),
@@ -213,8 +163,16 @@ SECTIONS: tuple[Field, ...] = (
     Field(name="remote", kind="name", required=True, doc="Another point, with line between."),
 )
 
+COORDINATES: tuple[Field, ...] = (
+    Field(name="bus", kind="name", required=True, doc="A bus of the feeder, once."),
+    Field(name="x", kind="number", required=True, doc="To the right, in any unit."),
+    Field(name="y", kind="number", required=True, doc="Upwards, in the same."),
+)
+
 ROWS: dict[str, tuple[Field, ...]] = {
+    "codes": CODES,
     "lines": LINES,
+    "inline_transformers": INLINE_TRANSFORMERS,
     "transformers": TRANSFORMERS,
     "loads": LOADS,
     "ders": DERS,
@@ -223,6 +181,7 @@ ROWS: dict[str, tuple[Field, ...]] = {
     "switches": SWITCHES,
     "points": POINTS,
     "sections": SECTIONS,
+    "coordinates": COORDINATES,
 }
 """The fields of each array of tables, in the order in which a file is written."""
 

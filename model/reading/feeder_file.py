@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -9,9 +11,11 @@ from pathlib import Path
 from ..errors import InputError
 from ..feeder import checked_feeder
 from ..parts import Feeder
+from .csv_write import csv_text
 from .feeder_document import document_from_feeder
+from .feeder_fields import CSV_TABLES, ROWS
 from .fields import did_you_mean
-from .toml_file import parse_toml, read_text, toml_rows
+from .toml_file import parse_toml, read_text, toml_rows, write_text
 
 __all__ = [
     "dump_feeder",
@@ -20,6 +24,7 @@ __all__ = [
     "load_feeder",
     "read_feeder",
     "shipped_feeders",
+    "write_feeder",
 ]
 
 _DATA = resources.files(__name__.removesuffix(".reading.feeder_file")) / "data"
@@ -95,7 +100,11 @@ def shipped_feeders() -> tuple[str, ...]:
 
 def dump_feeder(feeder: Feeder) -> str:
     """Return the text of a feeder file that reads back as exactly this feeder, origins included."""
-    document = document_from_feeder(feeder)
+    return _as_text(document_from_feeder(feeder))
+
+
+def _as_text(document: Mapping[str, object]) -> str:
+    """Return a document as TOML: first its plain values, then its tables in their order."""
     blocks: list[str] = []
     top = {key: value for key, value in document.items() if not isinstance(value, (dict, list))}
     blocks.append(toml_rows(top))
@@ -105,6 +114,53 @@ def dump_feeder(feeder: Feeder) -> str:
         elif isinstance(value, list):
             blocks.extend(f"[[{table}]]\n{toml_rows(row)}" for row in value)
     return "\n".join(blocks)
+
+
+def write_feeder(
+    feeder: Feeder, path: Path, *, tables: bool = False, comment: str = ""
+) -> tuple[Path, ...]:
+    """Write a feeder file that reads back as exactly this feeder, origins included.
+
+    Parameters
+    ----------
+    feeder
+        What to write; equal feeders of equal origins give equal files.
+    path
+        Of the feeder file; what stands there is replaced.
+    tables
+        Write the tables that may stand in CSV files to files of their own beside it, called
+        after it and the table: ``town.loads.csv``.
+    comment
+        Text at the head of the file, such as the source of its figures.
+
+    Returns
+    -------
+    tuple of Path
+        The files written, the feeder file first.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    document = document_from_feeder(feeder)
+    apart: dict[str, str] = {}
+    if tables:
+        stem = re.sub(r"[^\w.-]+", "-", path.stem)
+        named = {table: f"{stem}.{table}.csv" for table in CSV_TABLES if document[table]}
+        apart = {name: _table_text(document.pop(table), table) for table, name in named.items()}
+        document = {"format": document.pop("format"), "tables": named, **document}
+    head = "".join(f"# {line}".rstrip() + "\n" for line in comment.splitlines())
+    text = f"{head}\n{_as_text(document)}" if head else _as_text(document)
+    files = {path: text, **{path.parent / name: rows for name, rows in apart.items()}}
+    for file, content in files.items():
+        write_text(file, content)
+    return tuple(files)
+
+
+def _table_text(rows: object, table: str) -> str:
+    assert isinstance(rows, list)
+    return csv_text(rows, ROWS[table])
 
 
 def feeder_content(feeder: Feeder) -> str:

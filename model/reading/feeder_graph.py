@@ -1,17 +1,17 @@
-"""A feeder's graph: with its ties open a tree, and sections that lie well in it."""
+"""A feeder's graph: fed from the source with its ties open, and sections that lie well in it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
 from ..errors import KeyPath, Report
-from ..parts import Feeder, Point
-from ..topology import Edge, Tree, edges, forest, tree_path
+from ..parts import Feeder, Point, Regulator
+from ..topology import Edge, Tree, edges, forest, shortest_path, tree_path
 from .feeder_names import edge_ends
 
 __all__ = ["check_graph", "check_section_paths", "graph_is_known"]
 
-_EDGES = ("lines", "switches", "regulators")
+_EDGES = ("lines", "inline_transformers", "switches", "regulators")
 _JOINING = ("bus", "from", "to", "closed")
 
 
@@ -31,18 +31,12 @@ def _touches_graph(path: KeyPath) -> bool:
 
 
 def check_graph(feeder: Feeder, report: Report) -> None:
-    """In the normal state everything is one tree; one tie at most closes it to a loop."""
+    """In the normal state the source reaches every bus, and every loop has impedance."""
     graph = edges(feeder)
     every_bus = [name for _, name in edge_ends(feeder)]
     trees = forest(graph, [feeder.source.bus, *every_bus])
     _check_islands(feeder, trees[1:], report)
-    for tree in trees:
-        _check_loops(graph, tree, report)
-    ties = [index for index, switch in enumerate(feeder.switches) if not switch.closed]
-    for index in ties[1:]:
-        first = feeder.switches[ties[0]].name
-        rule = f"must not be a second tie beside {first!r}: one loop is solved, not several"
-        report.add(("switches", index), rule)
+    _check_loops(feeder, graph, report)
 
 
 def _check_islands(feeder: Feeder, islands: Iterable[Tree], report: Report) -> None:
@@ -54,23 +48,59 @@ def _check_islands(feeder: Feeder, islands: Iterable[Tree], report: Report) -> N
         report.add(path, rule, found if len(found) < 60 else f"{len(island)} buses apart")
 
 
-def _check_loops(graph: Iterable[Edge], tree: Tree, report: Report) -> None:
-    """Report each edge that closes a loop, and what it runs through."""
-    grown = {before[1].path for before in tree.values() if before is not None}
-    for edge in graph:
-        if edge.ends[0] in tree and edge.path not in grown:
-            _, others = tree_path(tree, *edge.ends)
-            loop = ", ".join(repr(other.name) for other in others)
-            report.add(edge.path, f"must not close a loop while ties are open, here with {loop}")
+def _check_loops(feeder: Feeder, graph: Iterable[Edge], report: Report) -> None:
+    """Report what closes a loop in which nothing limits the current, and what with."""
+    reported: set[KeyPath] = set()
+    bare = [(edge, _without_impedance(feeder, edge)) for edge in graph if not edge.is_line]
+    for phase in "abc":
+        own = [edge for edge, phases in bare if phase in phases]
+        grown = {
+            before[1].path: tree
+            for tree in forest(own, [edge.ends[0] for edge in own])
+            for before in tree.values()
+            if before is not None
+        }
+        trees = list(grown.values())
+        for edge in own:
+            if edge.path not in grown and edge.path not in reported:
+                reported.add(edge.path)
+                tree = next(tree for tree in trees if edge.ends[0] in tree)
+                others = ", ".join(repr(other.name) for other in tree_path(tree, *edge.ends)[1])
+                rule = f"must not close a loop without impedance, here with {others}"
+                report.add(edge.path, rule)
+
+
+def _without_impedance(feeder: Feeder, edge: Edge) -> str:
+    """The phases in which a switch or regulator has no impedance."""
+    table, index = edge.path
+    assert isinstance(index, int)
+    if table == "switches":
+        return feeder.switches[index].phases
+    if table == "regulators":
+        regulator = feeder.regulators[index]
+        bare = regulator.phases if regulator.z_ohm == 0.0 else ""
+        return bare + regulator.reference if _jumps(regulator) else bare
+    return ""
+
+
+def _jumps(regulator: Regulator) -> bool:
+    """Whether a phase goes through it without impedance, beside its units."""
+    own = regulator.reference in "abc" and regulator.reference not in regulator.phases
+    return own and regulator.jumper_ohm == 0.0
 
 
 def check_section_paths(feeder: Feeder, report: Report) -> None:
-    """Between the points of a section there is line, and no source."""
-    tree = forest(edges(feeder), [feeder.source.bus])[0]
+    """Between the points of a section there is line, and no source.
+
+    The way between them is the shortest by its number of lines, switches, regulators and
+    transformers; of several that over the lines of the points themselves.
+    """
+    graph = edges(feeder)
     points: Mapping[str, Point] = {point.name: point for point in feeder.points}
     for index, section in enumerate(feeder.sections):
         pair = (points[section.local], points[section.remote])
-        passed, taken = tree_path(tree, pair[0].bus, pair[1].bus)
+        lines = {point.line for point in pair}
+        passed, taken = shortest_path(graph, pair[0].bus, pair[1].bus, lines)
         between = {edge.name for edge in taken if edge.is_line}
         inside = [bus for bus in passed if bus not in {p.bus for p in pair if p.line in between}]
         if not between:

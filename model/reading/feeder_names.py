@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ..errors import KeyPath, Report
-from ..parts import Der, Feeder, Line, Load, Place, Regulator, Section, Switch
+from ..parts import (
+    Der,
+    Feeder,
+    InlineTransformer,
+    Line,
+    Load,
+    Place,
+    Regulator,
+    Section,
+    Switch,
+)
 from .feeder_fields import ROWS
 from .fields import did_you_mean
 
@@ -46,10 +56,11 @@ def _names(feeder: Feeder) -> dict[str, list[str]]:
 
 
 def edge_ends(feeder: Feeder) -> list[tuple[KeyPath, str]]:
-    """Return the buses that lines, switches and regulators imply, each with its key path."""
+    """Return the buses that what joins them implies, each with its key path."""
     found: list[tuple[KeyPath, str]] = []
-    parts: dict[str, Sequence[Line | Switch | Regulator]] = {
+    parts: dict[str, Sequence[Line | InlineTransformer | Switch | Regulator]] = {
         "lines": feeder.lines,
+        "inline_transformers": feeder.inline_transformers,
         "switches": feeder.switches,
         "regulators": feeder.regulators,
     }
@@ -77,6 +88,8 @@ def check_references(feeder: Feeder, report: Report) -> None:
             check((*path, "line"), place.line, names["lines"], "line")
 
     check(("source", "bus"), feeder.source.bus, known_buses, "bus")
+    for index, line in enumerate(feeder.lines):
+        check(("lines", index, "code"), line.code, names["codes"], "code")
     for index, unit in enumerate(feeder.transformers):
         check_place(("transformers", index), unit.place)
     for index, bank in enumerate(feeder.capacitors):
@@ -93,6 +106,13 @@ def check_references(feeder: Feeder, report: Report) -> None:
     for index, section in enumerate(feeder.sections):
         check(("sections", index, "local"), section.local, names["points"], "point")
         check(("sections", index, "remote"), section.remote, names["points"], "point")
+    drawn: set[str] = set()
+    for index, spot in enumerate(feeder.coordinates):
+        check(("coordinates", index, "bus"), spot.bus, known_buses, "bus")
+        if spot.bus in drawn:
+            rule = "must be there once for each bus"
+            report.add(("coordinates", index, "bus"), rule, repr(spot.bus))
+        drawn.update([spot.bus] if spot.bus else [])
 
 
 def check_ends(feeder: Feeder, report: Report) -> None:

@@ -31,6 +31,8 @@ Kind = Literal[
     "range",
     "numbers",
     "integers",
+    "matrix",
+    "phases",
     "table",
     "tables",
     "distribution",
@@ -57,6 +59,8 @@ class Field:
         - ``impedance``: ``[r, x]`` or ``{ mag, deg }``, bounds are on the magnitude and
           the resistance is never negative;
         - ``range``: ``[low, high]``; ``numbers``, ``integers``: a list; bounds are on each;
+        - ``matrix``: rows of numbers, 1 to 3 of them, symmetric; bounds are on the diagonal;
+        - ``phases``: one to three of the letters a, b, c;
         - ``table``, ``tables``: one table, an array of tables; not checked any deeper;
         - ``distribution``, ``whole`` (of whole numbers), ``choice`` (of texts), ``names``:
           what a study file has besides, checked there.
@@ -133,6 +137,8 @@ _KIND_WORDS: dict[Kind, str] = {
     "range": "[low, high]",
     "numbers": "a list of finite numbers",
     "integers": "a list of integers",
+    "matrix": "a symmetric matrix, [[...], ...] of 1 to 3 rows",
+    "phases": "phases, one to three of the letters a, b, c",
     "table": "a table",
     "tables": "an array of tables",
     "distribution": "a number, [low, high] or a distribution",
@@ -192,6 +198,8 @@ def _as_toml(value: object) -> str:
         return repr(value)
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(_as_toml(item) for item in value)}]"
+    if isinstance(value, complex):
+        return _as_toml([value.real, value.imag])
     if isinstance(value, Mapping):
         inside = ", ".join(f"{key} = {_as_toml(item)}" for key, item in value.items())
         return f"{{ {inside} }}" if inside else "{}"

@@ -66,11 +66,34 @@ def _assumes(field: Field) -> bool:
 
 def _concerns(table: str, field: str, row: _Row) -> bool:
     """Whether the field says anything about a row with these values."""
-    if table == "loads" and field == "connection":
-        return row["transformer"] is None
-    if table == "transformers" and field == "x0_pu":
-        return row["connection"] in ("Yg/Yg", "unknown")
+    match table, field:
+        case "loads", "connection" | "phases" | "branch_kv":
+            return row["transformer"] is None
+        case "loads", "power_factor":
+            return row["kvar"] is None
+        case "loads", "exponent":
+            return row["zip"] is None
+        case "lines", "c1_nf_per_km" | "c0_nf_per_km":
+            return row["code"] is None
+        case "transformers", "x0_pu":
+            return row["connection"] in ("Yg/Yg", "unknown")
+        case "inline_transformers", _:
+            return _concerns_inline(field, row["connection"])
+        case "regulators", "jumper_ohm":
+            return row["reference"] in ("a", "b", "c")
     return True
+
+
+def _concerns_inline(field: str, connection: str) -> bool:
+    """Whether the field says anything about a transformer of this connection."""
+    if field in ("phases", "to_phases"):
+        return connection in ("single", "centre-tap")
+    start, _, end = connection.partition("/")
+    return {
+        "shift": (start == "D") != (end == "D"),
+        "from_neutral_ohm": start == "Yg",
+        "to_neutral_ohm": end == "Yg",
+    }.get(field, True)
 
 
 def is_written(field: Field, row: _Row, origin: Origin | None) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from . import feeder_refused as refused
 from .fields import Field
+from .series_fields import PHASES
 
 __all__ = ["CAPACITORS", "DERS", "LOADS", "TRANSFORMERS"]
 
@@ -28,6 +29,20 @@ _POWER_FACTOR = Field(
     not_zero=True,
     default=1.0,
     doc="Power factor, negative for leading.",
+)
+
+_BRANCHES = replace(
+    PHASES,
+    doc="Of a wye: one branch from each to earth; of a delta: one between two, three around three.",
+)
+_BRANCH_KV = Field(
+    name="branch_kv",
+    kind="number",
+    unit="kV",
+    above=0.0,
+    high=1000.0,
+    absent="the bus's nominal",
+    doc="Voltage of each branch at which it takes its power.",
 )
 
 TRANSFORMERS: tuple[Field, ...] = (
@@ -85,22 +100,69 @@ LOADS: tuple[Field, ...] = (
         default="wye",
         doc="Of a load with a place; behind a transformer its winding decides.",
     ),
+    _BRANCHES,
+    _BRANCH_KV,
     Field(
         name="kw",
         kind="number",
         unit="kW",
         low=0.0,
         required=True,
-        doc="Three-phase active power at nominal voltage.",
+        doc="Active power of all branches at nominal voltage.",
     ),
     _POWER_FACTOR,
+    Field(
+        name="kvar",
+        kind="number",
+        unit="kvar",
+        doc="Reactive power of all branches, in place of `power_factor`.",
+    ),
     Field(
         name="exponent",
         kind="number",
         low=0.0,
-        high=2.0,
+        high=10.0,
         default=2.0,
         doc="P and Q go with voltage to this power: 2 impedance, 1 current, 0 power.",
+    ),
+    Field(
+        name="exponent_q",
+        kind="number",
+        low=0.0,
+        high=10.0,
+        doc="That of Q, where it is another than that of P.",
+    ),
+    Field(
+        name="zip",
+        kind="numbers",
+        count=6,
+        doc="In place of both, shares of impedance, current and power: of P, then of Q.",
+    ),
+    Field(
+        name="v_min_pu",
+        kind="number",
+        unit="pu",
+        above=0.0,
+        high=2.0,
+        default=0.7,
+        doc="Below it each branch is a constant impedance, its last one.",
+    ),
+    Field(
+        name="v_max_pu",
+        kind="number",
+        unit="pu",
+        above=0.0,
+        high=10.0,
+        absent="none",
+        doc="Above it the same.",
+    ),
+    Field(
+        name="v_low_pu",
+        kind="number",
+        unit="pu",
+        low=0.0,
+        high=2.0,
+        doc="Down to it from `v_min_pu` the impedance goes back to the nominal one, linearly.",
     ),
     Field(
         name="motor_share",
@@ -180,12 +242,14 @@ CAPACITORS: tuple[Field, ...] = (
         default="wye",
         doc="Grounded wye, or delta.",
     ),
+    _BRANCHES,
+    _BRANCH_KV,
     Field(
         name="kvar",
         kind="number",
         unit="kvar",
         above=0.0,
         required=True,
-        doc="Three-phase reactive power at nominal voltage.",
+        doc="Reactive power of all branches at nominal voltage.",
     ),
 )

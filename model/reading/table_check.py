@@ -173,11 +173,35 @@ def _read_range(value: object, field: Field) -> tuple[float, float]:
 def _read_numbers(value: object, field: Field) -> tuple[float, ...]:
     found = [_finite(item) for item in value] if isinstance(value, list) else [None]
     numbers = tuple(number for number in found if number is not None)
-    if len(numbers) < len(found):
+    if len(numbers) < len(found) or field.count not in (None, len(found)):
         raise _UnfitError(f"must be {describe_field(field)}")
     for number in numbers:
         _check_bounds(number, field, "hold numbers ")
     return numbers
+
+
+def _read_matrix(value: object, field: Field) -> tuple[tuple[float, ...], ...]:
+    rows = value if isinstance(value, list) else []
+    found = [[_finite(item) for item in row] if isinstance(row, list) else [] for row in rows]
+    matrix = [[item for item in row if item is not None] for row in found]
+    if not 1 <= len(rows) <= 3 or any(len(row) != len(rows) for row in (*found, *matrix)):
+        raise _UnfitError(f"must be {describe_field(field)}")
+    for i, row in enumerate(matrix):
+        _check_bounds(row[i], field, "have a diagonal ")
+        for j, item in enumerate(row):
+            if item != matrix[j][i]:
+                raise _UnfitError("must be symmetric")
+            if abs(item) > MOST:  # a mutual one may be as small as reckoning left it
+                raise _UnfitError(f"must hold numbers up to {MOST:g}")
+    return tuple(tuple(row) for row in matrix)
+
+
+def _read_phases(value: object, field: Field) -> str:
+    if not isinstance(value, str) or not value or set(value) - set("abc"):
+        raise _UnfitError(f"must be {describe_field(field)}")
+    if len(set(value)) < len(value):
+        raise _UnfitError("must name each phase once")
+    return value
 
 
 def _read_integers(value: object, field: Field) -> tuple[int, ...]:
@@ -214,6 +238,8 @@ _READERS: dict[Kind, Callable[[object, Field], object]] = {
     "range": _read_range,
     "numbers": _read_numbers,
     "integers": _read_integers,
+    "matrix": _read_matrix,
+    "phases": _read_phases,
     "table": _read_table,
     "tables": _read_tables,
 }
@@ -228,13 +254,15 @@ _STAND_INS: dict[Kind, object] = {
     "range": (0.0, 1.0),
     "numbers": (),
     "integers": (),
+    "matrix": ((1.0,),),
+    "phases": "abc",
     "table": None,
     "tables": (),
 }
 
 
 def _stand_in(field: Field) -> object:
-    if field.kind == "integers" and field.count is not None:
+    if field.kind in ("numbers", "integers") and field.count is not None:
         return (0,) * field.count
     return field.choices[0] if field.choices else _STAND_INS[field.kind]
 

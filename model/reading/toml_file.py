@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import Fault, InputError, Report
 from .toml_lines import locator, syntax_error_line
 
-__all__ = ["parse_toml", "read_text", "toml_rows"]
+__all__ = ["parse_toml", "read_text", "toml_rows", "write_text"]
 
 
 def read_text(path: Path) -> str:
@@ -30,6 +30,21 @@ def read_text(path: Path) -> str:
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise InputError.single(str(path), "", reason, "must be a file to read") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file of UTF-8 text, the same on every system.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise InputError.single(str(path), "", reason, "must be a file to write") from error
 
 
 def parse_toml(text: str, source_name: str) -> Report:
