@@ -15,7 +15,7 @@ from .parts import Feeder, Point, Section
 from .path_impedance import Impedances, impedances_of, path_z1_ohm, rest_of_loop_z1_ohm
 from .sides import joined, sides_of
 from .states import Probes
-from .topology import Neighbours, edges, neighbours, shortest_path
+from .topology import Edge, edges, shortest_path
 
 __all__ = ["Points", "Terminal", "find_points", "into_line", "point_probes"]
 
@@ -114,7 +114,7 @@ class _State:
     network: Network
     opened: frozenset[str]
     normal: Network
-    beside: Neighbours  #: the graph of the normal state
+    graph: tuple[Edge, ...]  #: of the normal state
     touching: Mapping[str, Sequence[Piece]]  #: its pieces at each node
     impedances: Impedances
     feeds: NDArray[np.int64]  #: nodes of the source and of DER with an EMF
@@ -136,7 +136,7 @@ def _state(feeder: Feeder, network: Network, opened: frozenset[str]) -> _State:
         network=network,
         opened=opened,
         normal=normal,
-        beside=neighbours(edges(feeder)),
+        graph=edges(feeder),
         touching=touching,
         impedances=impedances_of(feeder, network),
         feeds=np.append(network.tree.unit_node[np.array(units, np.int64)], 0),
@@ -149,13 +149,13 @@ def _terminals(state: _State, section: Section) -> list[Terminal]:
     points = {p.name: n for n, p in enumerate(feeder.points)}
     ends = [feeder.points[points[name]] for name in (section.local, section.remote)]
     # the path is that of the normal state, whatever is switched in this network
-    _, path = shortest_path(state.beside, ends[0].bus, ends[1].bus)
+    buses = ends[0].bus, ends[1].bus
+    _, path = shortest_path(state.graph, *buses, [point.line for point in ends])
     lines = {edge.name for edge in path if edge.is_line}
     on_path = np.array([p is not None and p.line in lines for p in network.pieces], np.bool_)
     in_section = on_path | _laterals(state, lines, ends)
     own_ends = {point.bus for point in ends if point.line in lines}
     edge_side, node_side = sides_of(network, on_path, in_section, own_ends, state.normal)
-    buses = ends[0].bus, ends[1].bus
     steps = [(edge.name if edge.is_line else None, edge.ends) for edge in path]
     z1 = path_z1_ohm(state.impedances, steps, buses)
     rest = rest_of_loop_z1_ohm(state.impedances, network, on_path, buses)

@@ -17,8 +17,10 @@ def csv_text(rows: Sequence[Mapping[str, object]], fields: Sequence[Field]) -> s
 
     Examples
     --------
-    >>> fields = [Field(name=name, kind=kind, doc="") for name, kind in
-    ...           (("name", "name"), ("z_ohm", "impedance"), ("kw", "number"))]
+    >>> fields = [
+    ...     Field(name=name, kind=kind, doc="")
+    ...     for name, kind in (("name", "name"), ("z_ohm", "impedance"), ("kw", "number"))
+    ... ]
     >>> csv_text([{"name": "A", "z_ohm": [0.1, 0.5]}, {"name": "B"}], fields)
     'name,z_ohm.r,z_ohm.x\nA,0.1,0.5\nB,,\n'
     """

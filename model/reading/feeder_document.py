@@ -112,9 +112,7 @@ def _check_place(row: _Row, allowed: Sequence[set[str]], path: KeyPath, report: 
         report.add(path, f"must say where it hangs, by {ways}", " and ".join(given) or "none")
 
 
-def _check_behind_transformer(
-    raw: Mapping[str, object], path: KeyPath, report: Report
-) -> None:
+def _check_behind_transformer(raw: Mapping[str, object], path: KeyPath, report: Report) -> None:
     """Report what a load says of itself where the transformer above it decides that."""
     if "transformer" not in raw or REPORTED in raw.values():
         return

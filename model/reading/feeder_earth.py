@@ -70,7 +70,11 @@ def check_isolated(feeder: Feeder, own: OwnChecks) -> None:
         _lines_tie(feeder, zone)
         or any(bank.connection == "wye" and bank.place in zone for bank in feeder.capacitors)
         or any(der.z0_ohm is not None and der.place in zone for der in feeder.ders)
-        or any(load.connection == "wye" and _burdens(load) for load in feeder.loads if load.place in zone)
+        or any(
+            load.connection == "wye" and _burdens(load)
+            for load in feeder.loads
+            if load.place in zone
+        )
         or _units_tie(feeder, zone)
         or _inline_ties(feeder, zone)
     )

@@ -81,7 +81,9 @@ def _check_joining(feeder: Feeder, there: Mapping[str, int], report: Report) -> 
 def _require(path: KeyPath, wanted: str, there: int, report: Report) -> None:
     """Report phases that are not there."""
     if phase_mask(wanted) & ~there:
-        rule = f"must be among the phases that the source reaches there with, {_named(letters(there))}"
+        rule = (
+            f"must be among the phases that the source reaches there with, {_named(letters(there))}"
+        )
         report.add(path, rule, repr(wanted))
 
 
@@ -117,5 +119,7 @@ def check_volts(feeder: Feeder, report: Report) -> None:
             ways.append((path, unit.to_bus, to_side_volts(unit)))
     for path, bus, brought in ways:
         if abs(brought - volts[bus]) > _TOLERANCE * volts[bus]:
-            rule = f"must bring the {volts[bus] / 1000.0:.4g} kV to earth that bus {bus!r} has already"
+            rule = (
+                f"must bring the {volts[bus] / 1000.0:.4g} kV to earth that bus {bus!r} has already"
+            )
             report.add(path, rule, f"{brought / 1000.0:.4g} kV")

@@ -135,10 +135,15 @@ KEYS: dict[str, _Pairs] = {
         (r"reclosers?|breakers?|sectionali[sz]ers?|fuses?|ties?", "a switch, written [[switches]]"),
         (r"shunts?|reactors?", "a shunt reactor, which has no model"),
         (r"(zigzag|grounding|earthing).*", "an earthing transformer, which has no model"),
-        (r"buses|nodes", "buses are made by the lines, transformers, switches and regulators that end there"),
+        (
+            r"buses|nodes",
+            "buses are made by the lines, transformers, switches and regulators that end there",
+        ),
         (r"faults?|events?", "events belong into the study file"),
     ),
-    "tables": ((r"codes|regulators|sections|source", "this table stands in the feeder file itself"),),
+    "tables": (
+        (r"codes|regulators|sections|source", "this table stands in the feeder file itself"),
+    ),
     "source": (
         (
             r"scc.*|mva.*|short_circuit.*",
@@ -180,7 +185,10 @@ KEYS: dict[str, _Pairs] = {
             " [[inline_transformers]]",
         ),
         (r"clock|vector_?group", "the windings are given by connection"),
-        (r"tap.*|ratio.*", "taps belong to transformers between two buses, [[inline_transformers]]"),
+        (
+            r"tap.*|ratio.*",
+            "taps belong to transformers between two buses, [[inline_transformers]]",
+        ),
         (r"tertiary.*", "a three-winding unit, which has no model"),
         (r"windings?", "the windings are given by connection"),
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from itertools import permutations
+from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
@@ -123,17 +123,25 @@ def test_sides_in_meshed_normal_states_are_what_a_walk_finds() -> None:
     assert seen == {Side.PATH, Side.LATERAL, Side.UPSTREAM, Side.DOWNSTREAM, Side.OTHER}
 
 
-def test_a_line_beside_the_path_keeps_what_is_beyond_from_being_downstream() -> None:
-    """Two lines side by side from 1 to 3, one of them the section."""
-    own = feeder_of([(0, 1), (1, 2), (2, 3), (1, 3), (3, 4), (0, 5)], [])
-    points = (Point(name="P", bus="1", line="1-2"), Point(name="Q", bus="3", line="2-3"))
+def test_beside_a_second_way_nothing_is_downstream() -> None:
+    """Two lines side by side from 1 to 2, one of them the section."""
+    own = feeder_of([(0, 1), (1, 2), (2, 3), (0, 4)], [])
+    points = (Point(name="P", bus="1", line="1-2"), Point(name="Q", bus="2", line="1-2"))
     own = replace(own, points=points, sections=(Section(local="P", remote="Q"),))
-    # fewer parts lead over 1-3: that is the section then
-    with_ends = find_points(own, compile_network(own)).terminals[0]
-    assert path_of(own, with_ends) == {"1-3"}
-    longer = replace(own, lines=tuple(li for li in own.lines if li.name != "1-3"))
-    radial = find_points(longer, compile_network(longer)).terminals[0]
-    assert path_of(longer, radial) == {"1-2", "2-3"}
+    beside = replace(own, lines=(replace(own.lines[1], name="beside"), *own.lines))
+    wanted = {
+        True: {"0-1": Side.UPSTREAM, "1-2": Side.PATH, "2-3": Side.DOWNSTREAM, "0-4": Side.OTHER},
+        False: {"0-1": Side.UPSTREAM, "1-2": Side.PATH, "2-3": Side.UPSTREAM, "0-4": Side.OTHER},
+    }
+    for feeder in (own, beside):
+        network = compile_network(feeder)
+        terminal = find_points(feeder, network).terminals[0]
+        sides = {
+            piece.line: Side(side)
+            for piece, side in zip(network.pieces, terminal.edge_side, strict=True)
+            if piece is not None and piece.line != "beside"
+        }
+        assert sides == wanted[feeder is own]
 
 
 @pytest.mark.parametrize("loops", [0, 3])
@@ -144,9 +152,7 @@ def test_ten_terminals_on_three_thousand_buses_take_seconds(loops: int) -> None:
     across = [(40 * n + 3, 40 * n + 25) for n in range(loops)]
     own = feeder_of([*trunk, *laterals, *across], [])
     points = tuple(Point(name=f"P{n}", bus=str(n), line=f"{n}-{n + 1}") for n in range(50, 351, 60))
-    sections = tuple(
-        Section(local=a.name, remote=b.name) for a, b in zip(points, points[1:], strict=False)
-    )
+    sections = tuple(Section(local=a.name, remote=b.name) for a, b in pairwise(points))
     loads = tuple(
         Load(
             name=f"load {k}",
