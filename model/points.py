@@ -186,15 +186,17 @@ def _laterals(state: _State, lines: set[str], ends: list[Point]) -> NDArray[np.b
     along = [p for p in state.normal.pieces if p is not None and p.line in lines]
     inner = {name for p in along for name in p.ends} - outer
     feeder = state.feeder
-    _, reached = _grow(state.touching, lines, inner, outer, ends)
-    if feeder.source.bus in reached:
+    _, reached = _grow(state.touching, lines, inner, ends)
+    if feeder.source.bus in reached or outer & reached:
         raise InputError.single(
             feeder.name,
             f"sections '{ends[0].name}'–'{ends[1].name}'",
-            "a way to the source that passes neither of them",
+            "a way out of it that passes neither of them"
+            if outer & reached
+            else "a way to the source that passes neither of them",
             "must be fed through its two points alone",
         )
-    found, _ = _grow(state.touching, lines, inner, outer, list(feeder.points))
+    found, _ = _grow(state.touching, lines, inner, list(feeder.points))
     return np.array([p is not None and p.key in found for p in state.network.pieces], np.bool_)
 
 
@@ -202,7 +204,6 @@ def _grow(
     touching: Mapping[str, Sequence[Piece]],
     lines: set[str],
     inner: set[str],
-    outer: set[str],
     points: list[Point],
 ) -> tuple[set[object], set[str]]:
     """Pieces off ``lines``, and nodes, that are joined to ``inner`` past none of ``points``."""
@@ -217,7 +218,7 @@ def _grow(
                 continue
             found.add(piece.key)
             far = piece.ends[0] if piece.ends[1] == name else piece.ends[1]
-            if far not in reached and far not in outer and (far, piece.line) not in guarded:
+            if far not in reached and (far, piece.line) not in guarded:
                 reached.add(far)
                 waiting.append(far)
     return found, reached

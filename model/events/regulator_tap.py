@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..distributions import Distribution
 from ..network import Network
 from .base import Event, no_event
-from .shunts import one_of_three
+from .phases import row_flags
 
 __all__ = ["draw_regulator_tap"]
 
@@ -32,7 +32,7 @@ def draw_regulator_tap(
         raise ValueError("regulator taps: the network has 0 regulators, wanted at least 1")
     which = rng.integers(count, size=size)
     moves = taps.draw(rng, size)
-    phase = one_of_three(rng, size) | (rng.random(size) >= single_phase_share)
+    phase = row_flags(rng.integers(3, size=size)) | (rng.random(size) >= single_phase_share)
     moved = phase & (which == np.arange(count)[:, None, None])
     edges = np.array([np.flatnonzero(network.tree.regulator == r)[0] for r in range(count)])
     return replace(

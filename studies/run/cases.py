@@ -48,7 +48,7 @@ class Sites:
     """Lines of medium voltage on which events of a class may stand."""
 
     lines: Places  #: all of them, for breaks
-    regions: tuple[Places, ...]  #: of each section, and those in none
+    regions: tuple[Places, ...]  #: of each section, and of what lies alike to all of them
 
     @property
     def edges(self) -> NDArray[np.int64]:
@@ -168,13 +168,26 @@ def _others(
 def _sites(network: Network, points: Points, least_phases: int) -> Sites:
     """Lines of medium voltage with at least so many phases."""
     medium = _medium_voltage(network, points)
-    sections = [terminal.in_section & medium for terminal in points.terminals[::2]]
-    rest = medium & ~np.any(sections, axis=0)
-    regions = [places_on(network, chosen, least_phases) for chosen in [*sections, rest]]
+    sections = [terminal.in_section for terminal in points.terminals[::2]]
+    regions = [
+        places_on(network, medium & chosen, least_phases)
+        for chosen in (*sections, *_beside(points, ~np.any(sections, axis=0)))
+    ]
     return Sites(
         lines=places_on(network, medium, least_phases),
         regions=tuple(region for region in regions if region.edges.size),
     )
+
+
+def _beside(points: Points, rest: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+    """What is in no section, in parts that lie alike to every section.
+
+    A short stretch upstream of all would hardly be drawn, if long laterals were one with it.
+    """
+    sides = np.stack([terminal.edge_side for terminal in points.terminals[::2]])
+    _, part = np.unique(sides, axis=1, return_inverse=True)
+    part = part.reshape(-1)
+    return [rest & (part == n) for n in np.unique(part[rest])]
 
 
 def _medium_voltage(network: Network, points: Points) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from ...model.machine_state import machine_state
 from ...model.machines import DER_MODELS
 from ...model.network import CONNECTIONS
 from ...model.solve import quiet_state
-from ...model.states import State
+from ...model.states import OWN_LAW, State
 from ..spec.correlations import draw_scalars
 from .cases import Case, Group, Wired, make_case, make_cases
 from .classes import DrawClass, Purpose
