@@ -81,7 +81,7 @@ def _product(problem: Problem) -> Callable[[], None]:
 
     def run() -> None:
         for before, after in blocks:
-            start = solve(problem.network, before, problem.probes).unit_v_pu
+            start = solve(problem.network, before, problem.probes).winding_v_pu
             solve(problem.network, after, problem.probes, start=start)
 
     return run

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .machine_state import carried_over
 from .network import Network
 from .solve import TOLERANCE_PU, solve
-from .states import NOT_CONVERGED, Answer, Probes, State
+from .states import NOT_CONVERGED, Answer, Probes, State, unit_voltages
 
 __all__ = ["OVERVOLTAGE_PU", "solve_after"]
 
@@ -45,7 +45,7 @@ def solve_after(
     """
     before, known = first
     der_factor, der_model = ders
-    start = known.unit_v_pu * (after.emf_pu / before.emf_pu)
+    start = known.winding_v_pu * (after.emf_pu / before.emf_pu)
     state = carried_over(network, before, known, after, der_factor, der_model)
     answer = solve(network, state, probes, start=start, tolerance_pu=tolerance_pu)
     if not network.machines.ders:
@@ -74,8 +74,9 @@ def _overvoltage(network: Network, answer: Answer) -> NDArray[np.bool_]:
     is the positive sequence that counts.
     """
     units = network.machines.unit[network.machines.motor_load.size :]
+    windings = unit_voltages(answer, len(network.units))
     seen = slice(3, 4) if network.three_wire else slice(0, 3)
-    return np.asarray(answer.unit_v_pu[units, seen].max(axis=(0, 1)) > OVERVOLTAGE_PU)
+    return np.asarray(windings[units, seen].max(axis=(0, 1)) > OVERVOLTAGE_PU)
 
 
 def _some(state: State, chosen: NDArray[np.int64]) -> State:

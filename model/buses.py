@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 
-from .parts import Feeder, InlineTransformer, Regulator
+from .parts import Feeder, InlineTransformer, Line, Regulator, Switch
 from .phases import conductors, phase_mask
 
 __all__ = ["bus_phases", "bus_volts", "fed_backwards", "to_side_volts"]
@@ -28,6 +28,11 @@ def _from_side_volts(unit: InlineTransformer) -> float:
     return unit.kv_from * 1000.0 / ROOT
 
 
+def _joining(feeder: Feeder) -> list[Line | Switch | Regulator]:
+    """What joins two buses of one nominal voltage."""
+    return [*feeder.lines, *feeder.switches, *feeder.regulators]
+
+
 def bus_volts(feeder: Feeder) -> dict[str, float]:
     """Nominal phase-to-earth volts of every bus, all switches taken as closed."""
     return _volts(feeder)[0]
@@ -40,7 +45,7 @@ def fed_backwards(feeder: Feeder) -> set[str]:
 
 def _volts(feeder: Feeder) -> tuple[dict[str, float], set[str]]:
     joined: defaultdict[str, list[tuple[str, InlineTransformer | None, bool]]] = defaultdict(list)
-    for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
+    for part in _joining(feeder):
         joined[part.from_bus].append((part.to_bus, None, True))
         joined[part.to_bus].append((part.from_bus, None, False))
     for unit in feeder.inline_transformers:
@@ -65,7 +70,7 @@ def _volts(feeder: Feeder) -> tuple[dict[str, float], set[str]]:
 def bus_phases(feeder: Feeder) -> dict[str, int]:
     """Bit mask of the phases that reach every bus from the source, all switches closed."""
     joined: defaultdict[str, list[tuple[str, int, int]]] = defaultdict(list)
-    for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
+    for part in _joining(feeder):
         mask = phase_mask(conductors(part) if isinstance(part, Regulator) else part.phases)
         joined[part.from_bus].append((part.to_bus, mask, 0))
         joined[part.to_bus].append((part.from_bus, mask, 0))

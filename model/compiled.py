@@ -11,7 +11,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 
-__all__ = ["compiled"]
+__all__ = ["compiled", "compiled_apart", "compiled_door"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -26,11 +26,38 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     They make no arrays and count no references to those they are given: counting, at each
     call with a record of thirty arrays, took as long as the arithmetic.
     """
+    return _compile(function, forceinline=True, door=not _takes_record(function))
+
+
+def compiled_apart(function: Callable[P, R]) -> Callable[P, R]:
+    """``compiled``, and called rather than folded in: for large parts that run seldom."""
+    return _compile(function, forceinline=False, door=not _takes_record(function))
+
+
+def compiled_door(function: Callable[P, R]) -> Callable[P, R]:
+    """``compiled``, for what takes whole records and is called from Python.
+
+    All others that do have no face for Python: unpacking forty arrays takes longer to compile
+    than what they do with them.
+    """
+    return _compile(function, forceinline=False, door=True)
+
+
+def _takes_record(function: Callable[P, R]) -> bool:
+    return not _RECORDS.isdisjoint(str(kind) for kind in function.__annotations__.values())
+
+
+_RECORDS = frozenset({"Tree", "State", "Work"})
+
+
+def _compile(function: Callable[P, R], *, forceinline: bool, door: bool) -> Callable[P, R]:
     options: dict[str, Any] = {
         "error_model": "numpy",
         "fastmath": {"contract"},
-        "forceinline": True,
+        "forceinline": forceinline,
         "_nrt": False,
+        "no_cpython_wrapper": not door,
+        "no_cfunc_wrapper": not door,
     }
     config: Any = numba.config
     user_s, config.CACHE_DIR = config.CACHE_DIR, _FOLDER

@@ -24,6 +24,7 @@ __all__ = [
     "Integers",
     "Lognormal",
     "Normal",
+    "Quantiles",
     "Triangular",
     "Uniform",
     "Values",
@@ -300,6 +301,41 @@ class Values(Distribution):
         if any(after <= before for before, after in pairwise(self.values)):
             return "must be values = [...], rising"
         return _weights_fault(self.weights, len(self.values))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantiles(Distribution):
+    """A distribution as it was measured: values at equal steps of probability, linear between.
+
+    Parameters
+    ----------
+    values
+        From the least to the greatest; none is below the one before.
+
+    Examples
+    --------
+    >>> Quantiles(values=(0.2, 0.5, 1.0)).quantile(np.array([0.0, 0.25, 1.0])).tolist()
+    [0.2, 0.35, 1.0]
+    """
+
+    values: tuple[float, ...]
+
+    def quantile(self, u: Real) -> Real:
+        """Return the value at the share ``u`` of the steps."""
+        steps = np.linspace(0.0, 1.0, len(self.values))
+        return np.asarray(np.interp(u, steps, np.asarray(self.values, np.float64)), np.float64)
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """The least and the greatest."""
+        return self.values[0], self.values[-1]
+
+    def fault(self) -> str | None:
+        """Demand two values or more, in order."""
+        falls = any(after < before for before, after in pairwise(self.values))
+        if len(self.values) < 2 or falls:
+            return "must be quantiles = [...], two or more, none below the one before"
+        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

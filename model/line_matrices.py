@@ -6,33 +6,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .parts import Feeder, Line, LineCode
-from .phases import phase_mask, phase_rows
+from .phases import phase_rows
 from .symmetrical import phase_matrix
 
-__all__ = ["phase_mask", "phase_rows", "shunt_nf_per_km", "z1_ohm", "z_ohm_per_km"]
+__all__ = ["shunt_nf_per_km", "z1_ohm", "z_ohm_per_km"]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
-def z_ohm_per_km(feeder: Feeder, line: Line) -> Complex:
-    """(3, 3) series impedance per km; zero in the rows of phases that are not there."""
-    if line.code is None:
-        assert line.z1_ohm_per_km is not None
-        assert line.z0_ohm_per_km is not None
-        z = phase_matrix(line.z0_ohm_per_km, line.z1_ohm_per_km, line.z1_ohm_per_km)
-        return _of_phases(z, line.phases)
-    code = _code(feeder, line)
-    z = np.array(code.r_ohm_per_km, np.float64) + 1j * np.array(code.x_ohm_per_km, np.float64)
-    return _placed(z, line.phases)
+def z_ohm_per_km(line: Line, code: LineCode | None) -> Complex:
+    """(3, 3) series impedance per km; zero in the rows of phases that are not there.
+
+    ``code`` is the one that the line names, None where it names none.
+    """
+    if code is not None:
+        z = np.array(code.r_ohm_per_km, np.float64) + 1j * np.array(code.x_ohm_per_km, np.float64)
+        return _placed(z, line.phases)
+    assert line.z1_ohm_per_km is not None
+    assert line.z0_ohm_per_km is not None
+    z = phase_matrix(line.z0_ohm_per_km, line.z1_ohm_per_km, line.z1_ohm_per_km)
+    return _of_phases(z, line.phases)
 
 
-def shunt_nf_per_km(feeder: Feeder, line: Line) -> Real:
+def shunt_nf_per_km(line: Line, code: LineCode | None) -> Real:
     """(3, 3) charging capacitance per km; zero in the rows of phases that are not there."""
-    if line.code is None:
+    if code is None:
         c = phase_matrix(line.c0_nf_per_km, line.c1_nf_per_km, line.c1_nf_per_km)
         return np.asarray(_of_phases(c, line.phases).real)
-    code = _code(feeder, line)
     if code.c_nf_per_km is None:
         return np.zeros((3, 3))
     return np.asarray(_placed(np.array(code.c_nf_per_km, np.complex128), line.phases).real)
@@ -46,15 +47,12 @@ def z1_ohm(feeder: Feeder, line: Line) -> complex:
     """
     if line.code is None and line.z1_ohm_per_km is not None:
         return line.z1_ohm_per_km * line.length_km
-    z = z_ohm_per_km(feeder, line)
+    code = next((code for code in feeder.codes if code.name == line.code), None)
+    z = z_ohm_per_km(line, code)
     count = len(line.phases)
     own = complex(np.trace(z)) / count
     mutual = (complex(z.sum()) - complex(np.trace(z))) / (count * (count - 1)) if count > 1 else 0j
     return (own - mutual) * line.length_km
-
-
-def _code(feeder: Feeder, line: Line) -> LineCode:
-    return next(code for code in feeder.codes if code.name == line.code)
 
 
 def _of_phases(matrix: Complex, phases: str) -> Complex:

@@ -41,7 +41,8 @@ def machine_state(
     der_level : (D, S) array, optional
         Factor on what the DER deliver; by default 1. At 0 they are disconnected.
     """
-    own, v = network.machines, network.tree.v_nominal_v
+    own = network.machines
+    v = network.tree.unit_v[own.unit][:, None]
     size = load_scale.shape[1]
     motors, load = own.motor_load.size, own.motor_load
     share = np.tile(own.motor_share[:, None], size) if share is None else share
@@ -51,9 +52,9 @@ def machine_state(
     va[:motors] = own.load_va[load, None] * load_scale[load] * share
     va[motors:] = -own.der_va[:, None] * level
     follows = np.zeros((own.count, size))
-    follows[:motors] = exponent[load]
+    follows[:motors] = np.where(exponent[load] < 0.0, own.motor_exponent[:, None], exponent[load])
     y = np.zeros((own.count, 3, size), np.complex128)
-    y[:motors, 2] = y2_y1 * va[:motors].conj() / (3.0 * v * v)
+    y[:motors, 2] = y2_y1 * va[:motors].conj() / (3.0 * v[:motors] ** 2)
     connected = va[motors:] != 0.0
     y[motors:, 0] = np.where(connected, own.der_y_s[:, 0, None], 0.0)
     y[motors:, 2] = np.where(connected, own.der_y_s[:, 2, None], 0.0)
@@ -95,10 +96,10 @@ def carried_over(
         return after
     ders = slice(own.motor_load.size, None)
     kind = np.tile(own.der_model[:, None], factor.shape[1]) if model is None else model
-    v1 = answer.machine_v1_v[ders]
+    v1, nominal = answer.machine_v1_v[ders], tree.unit_v[own.unit[ders]][:, None]
     factor = np.where(before.machine_va[ders] == 0.0, 0.0, factor)  # not even connected
-    asked = before.machine_va[ders].conj() / (3.0 * tree.v_nominal_v**2)
-    current = -asked * np.maximum(np.abs(v1) / tree.v_nominal_v, FLOOR_PU) ** -2.0 * v1 * factor
+    asked = before.machine_va[ders].conj() / (3.0 * nominal**2)
+    current = -asked * np.maximum(np.abs(v1) / nominal, FLOOR_PU) ** -2.0 * v1 * factor
     behind = np.isin(kind, (0, 1))
     y1 = np.where(behind, own.der_y_s[:, 1, None], 0.0)
     kept = kind != DER_MODELS.index("constant_power")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .parts import Der, Feeder, Load
 
-__all__ = ["DER_MODELS", "Machines", "machines_of", "power_va"]
+__all__ = ["DER_MODELS", "Machines", "has_motor", "load_va", "machines_of", "power_va"]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -35,6 +35,7 @@ class Machines:
     motor_load: Int  #: (motors,) the load that each motor is part of
     motor_share: Real  #: (motors,) of that load, as in the file
     motor_y2_y1: Real  #: (motors,)
+    motor_exponent: Real  #: (motors,) of those whose load follows a law of its own
     load_va: Complex  #: (L,) P + jQ of every load, as in the file
     ders: tuple[str, ...]
     der_va: Complex  #: (D,) P + jQ delivered
@@ -53,12 +54,24 @@ def power_va(kw: float, power_factor: float) -> complex:
     return complex(p, math.copysign(p * math.sqrt(1.0 / power_factor**2 - 1.0), power_factor))
 
 
+def load_va(load: Load) -> complex:
+    """P + jQ of a load at nominal voltage."""
+    if load.kvar is None:
+        return power_va(load.kw, load.power_factor)
+    return complex(load.kw, load.kvar) * 1000.0
+
+
+def has_motor(load: Load, motors: bool) -> bool:
+    """Whether a load has motors; ``motors``: every one that can, with three phases."""
+    return load.motor_share > 0.0 or (motors and len(load.phases) == 3)
+
+
 def machines_of(feeder: Feeder, units: Sequence[object], motors: bool) -> Machines:
-    """The machines of a feeder; ``motors``: in every load.
+    """The machines of a feeder; ``motors``: in every load that can have one.
 
     ``units`` are the parts that hang on nodes: transformers, and loads and DER without one.
     """
-    rows = [n for n, load in enumerate(feeder.loads) if motors or load.motor_share > 0.0]
+    rows = [n for n, load in enumerate(feeder.loads) if has_motor(load, motors)]
     loads: list[Load] = [feeder.loads[n] for n in rows]
     names = [unit.name for unit in feeder.transformers]
 
@@ -77,7 +90,8 @@ def machines_of(feeder: Feeder, units: Sequence[object], motors: bool) -> Machin
         motor_load=np.array(rows, np.int64),
         motor_share=np.array([load.motor_share for load in loads], np.float64),
         motor_y2_y1=np.array([load.motor_y2_y1 for load in loads], np.float64),
-        load_va=np.array([power_va(x.kw, x.power_factor) for x in feeder.loads], np.complex128),
+        motor_exponent=np.array([load.exponent for load in loads], np.float64),
+        load_va=np.array([load_va(load) for load in feeder.loads], np.complex128),
         ders=tuple(der.name for der in ders),
         der_va=np.array([power_va(der.kw, der.power_factor) for der in ders], np.complex128),
         der_model=np.array([DER_MODELS.index(der.model) for der in ders], np.int64),

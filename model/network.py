@@ -2,7 +2,7 @@
 
 Buses and tees become nodes, pieces of line between them become edges. Lines are cut
 only where something stands: a tee of a transformer or load. An event may then stand
-anywhere on an edge. With a tie closed, one edge at the fork of the loop is the chord.
+anywhere on an edge. Every closed loop has one edge that is its chord.
 """
 
 from __future__ import annotations
@@ -12,19 +12,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .buses import bus_volts
+from .edges import hang_edges
+from .laws import law_rows, own_exponents
 from .machines import Machines, machines_of
 from .parts import Feeder, Source
-from .pieces import NO_PHASES, Piece, check_fed, detached_end, node_name, pieces_of, place_of, span
+from .pieces import Piece, check_fed, detached_end, node_name, pieces_of, place_of, span
 from .states import Tree
 from .symmetrical import phase_matrix
 from .units import (
     CONNECTIONS,
+    Nodes,
     assumed_connection,
     capacitor_shunts,
     connection_of,
     loads_of,
     regulator_arrays,
-    regulator_rows,
+    regulator_references,
     unit_arrays,
     units_of,
 )
@@ -42,31 +46,53 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Network:
-    """The compiled feeder. Edge k ends at node k; the chord, if any, is edge B."""
+    """The compiled feeder. Edge k ends at node k; chords, if any, are the last edges."""
 
     tree: Tree
     nodes: tuple[str, ...]  #: names: buses, and tees as LINE:FRACTION
     pieces: tuple[Piece | None, ...]  #: of each edge; None: the source impedance
     upward: NDArray[np.bool_]  #: (edges,) the edge's upper end is the piece's first end
     length_km: NDArray[np.float64]  #: (edges,)
-    units: tuple[str, ...]  #: transformers, then loads and DER that have none
+    units: tuple[str, ...]  #: transformers, then loads with motors and DER that have none
     loads: tuple[str, ...]
     connection: NDArray[np.int64]  #: (U,) as in the file
-    exponent: NDArray[np.float64]  #: (L,) as in the file
+    exponent: NDArray[np.float64]  #: (L,) as in the file; `BY_LAW`: it says more than that
     machines: Machines
     regulators: tuple[str, ...]
     ratio: NDArray[np.float64]  #: (R, 3) lower over upper voltage, as in the file
     ratio_step: NDArray[np.float64]  #: (R,) what one tap adds to the voltage, lower over upper
     ratio_most: NDArray[np.int64]  #: (R,) taps to either side of neutral
     ratio_upward: NDArray[np.bool_]  #: (R,) the regulator's from-end is the upper one
+    ratio_phases: NDArray[np.int64]  #: (R,) bit mask of the phases that have a unit
+    ratio_gang: NDArray[np.bool_]  #: (R,) they step together
     equipped: NDArray[np.bool_]  #: (edges,) something is connected below the edge
     emf_pu: float
     three_wire: bool
 
     @property
-    def has_chord(self) -> bool:
-        """Whether a closed loop runs over the last edge."""
-        return self.tree.tail >= 0
+    def chords(self) -> int:
+        """How many closed loops there are; the chord of each is one of the last edges."""
+        return self.tree.tail.size
+
+    @property
+    def node_phases(self) -> NDArray[np.int64]:
+        """(B,) bit mask of the phases at each node."""
+        return self.tree.node_phases
+
+    @property
+    def node_v(self) -> NDArray[np.float64]:
+        """(B,) nominal volts of each node, phase to earth."""
+        return self.tree.node_v
+
+    @property
+    def load_node(self) -> NDArray[np.int64]:
+        """(L,) where each load hangs, behind its transformer or directly."""
+        tree = self.tree
+        nodes = np.empty(tree.load_unit.size, np.int64)
+        behind = tree.load_unit >= 0
+        nodes[behind] = tree.unit_node[tree.load_unit[behind]]
+        nodes[tree.branch_load] = tree.branch_node
+        return nodes
 
     def node(self, name: str) -> int:
         """Index of the node called ``name``."""
@@ -78,7 +104,7 @@ class Network:
         return sorted(own, key=lambda k: _start(self.pieces[k]))
 
     def below(self, edge: int) -> NDArray[np.bool_]:
-        """(B,) the nodes that hang below ``edge``; none below the chord."""
+        """(B,) the nodes that hang below ``edge``; none below a chord."""
         hanging = np.zeros(len(self.nodes), np.bool_)
         if edge < hanging.size:
             hanging[edge] = True
@@ -127,72 +153,61 @@ def compile_network(
     opened : frozenset of str
         Measuring points whose recloser is open: their lines do not reach the bus there.
     motors : bool
-        Give every load a motor, and not only those that have one in the file.
+        Give every three-phase load a motor, and not only those that have one in the file.
 
     Raises
     ------
     InputError
-        For a network that the ladder cannot carry: more than one loop, a loop without
-        impedance at its fork, or a part that nothing feeds.
+        For a network that the ladder cannot carry: a loop without a line at its fork, windings
+        that leave more than one voltage undefined, or a part that nothing feeds.
     """
     if closed is None:
         closed = frozenset(s.name for s in feeder.switches if s.closed)
     pieces = pieces_of(feeder, closed, opened)
-    order, parent_piece, chord = span(feeder, pieces)
+    order, parent_piece, chords = span(feeder, pieces)
     check_fed(feeder, pieces, order)
+    edge_pieces = [None, *(pieces[parent_piece[n]] for n in order[1:]), *chords]
     index = {name: k for k, name in enumerate(order)}
-    count = len(order)
-    edge_pieces: list[Piece | None] = [None, *(pieces[parent_piece[n]] for n in order[1:])]
-    parent, upward = _hang(edge_pieces, order, index)
-    in_loop = np.zeros(count, np.bool_)
-    fork = tail = -1
-    if chord is not None:
-        ends = [index[name] for name in chord.ends]
-        fork, tail = min(ends), max(ends)
-        upward[count] = chord.ends[0] == order[tail]
-        k = tail
-        while k != fork:
-            in_loop[k] = True
-            k = int(parent[k])
-    edge_pieces.append(chord)
-    units = units_of(feeder)
+    edges = hang_edges(feeder, edge_pieces, index)
+    nodes = Nodes(row=index, volts=_node_volts(feeder, pieces, order))
+    units = units_of(feeder, motors)
     machines = machines_of(feeder, units, motors)
-    load_unit, load_y = loads_of(feeder, units)
+    unit_node = np.array([index[node_name(feeder, place_of(u))] for u in units], np.int64)
+    unit_part = unit_arrays(feeder, units, machines, nodes.volts[unit_node])
     source, neutral_y = feeder.source, _neutral_y(feeder.source)
-    source_z = phase_matrix(source.z0_ohm, source.z1_ohm, source.z2_ohm)
+    shunts = capacitor_shunts(feeder, nodes) + edges.shunt_s
+    law, linear = law_rows(feeder)
+    angle = np.deg2rad(source.angle_deg)
     tree = Tree(
-        parent=parent,
-        z_ohm=np.array([source_z, *_of_pieces(edge_pieces, "z_ohm")]),
-        end_y_s=np.array([NO_PHASES, *_of_pieces(edge_pieces, "end_y_s")]),
-        charged=any(line.c1_nf_per_km or line.c0_nf_per_km for line in feeder.lines),
-        regulator=regulator_rows(feeder, edge_pieces),
+        **edges.fields,
+        reference=regulator_references(feeder),
         lifted=source.neutral == "isolated" or neutral_y != 0.0,
         neutral_y_s=neutral_y,
-        in_loop=in_loop,
-        fork=fork,
-        tail=tail,
-        shunt_s=capacitor_shunts(feeder, index),
-        unit_node=np.array([index[node_name(feeder, place_of(u))] for u in units], np.int64),
-        **unit_arrays(feeder, units, machines),
-        load_unit=load_unit,
-        load_y_s=load_y,
+        shunt_s=shunts,
+        unit_node=unit_node,
+        **unit_part,
+        **loads_of(feeder, units, unit_part["unit_v"], nodes),
+        law=law,
+        law_linear=linear,
         machine_unit=machines.unit,
+        node_v=nodes.volts,
         v_nominal_v=feeder.source.v_phase_v,
+        emf_turn=complex(np.cos(angle), np.sin(angle)),
     )
-    kept = count + 1 if chord is not None else count
+    tree.z_ohm[0] = phase_matrix(source.z0_ohm, source.z1_ohm, source.z2_ohm)
     return Network(
         tree=tree,
         nodes=tuple(order),
-        pieces=tuple(edge_pieces[:kept]),
-        upward=upward[:kept],
-        length_km=np.array([p.length_km if p else 0.0 for p in edge_pieces[:kept]]),
+        pieces=tuple(edge_pieces),
+        upward=edges.upward,
+        length_km=np.array([p.length_km if p else 0.0 for p in edge_pieces]),
         units=tuple(unit.name for unit in units),
         loads=tuple(load.name for load in feeder.loads),
         connection=np.array([connection_of(feeder, unit) for unit in units], np.int64),
-        exponent=np.array([load.exponent for load in feeder.loads], np.float64),
+        exponent=own_exponents(feeder),
         machines=machines,
-        **regulator_arrays(feeder, edge_pieces, upward),
-        equipped=_equipped(tree)[:kept],
+        **regulator_arrays(feeder, edge_pieces, edges.upward),
+        equipped=_equipped(tree),
         emf_pu=feeder.source.emf_pu,
         three_wire=feeder.source.wires == 3,
     )
@@ -204,31 +219,25 @@ def _neutral_y(source: Source) -> complex:
     return 0j if extreme else 1.0 / complex(source.neutral_ohm)
 
 
-def _hang(
-    edge_pieces: list[Piece | None], order: list[str], index: dict[str, int]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Each node's parent, and whether its piece leads downwards; one place more for a chord."""
-    parent = np.full(len(order), -1, np.int64)
-    upward = np.ones(len(order) + 1, np.bool_)
-    for k, piece in enumerate(edge_pieces):
-        if piece is not None:
-            upward[k] = piece.ends[1] == order[k]
-            parent[k] = index[piece.ends[0] if upward[k] else piece.ends[1]]
-    return parent, upward
-
-
-def _of_pieces(pieces: list[Piece | None], name: str) -> list[NDArray[np.complex128]]:
-    """A matrix of every edge but the source's; zero where there is no chord."""
-    return [NO_PHASES if piece is None else getattr(piece, name) for piece in pieces[1:]]
+def _node_volts(feeder: Feeder, pieces: list[Piece], order: list[str]) -> NDArray[np.float64]:
+    """Nominal volts of every node: a bus's own, and along a line those of its end."""
+    volts = bus_volts(feeder)
+    bus_of = {line.name: line.from_bus for line in feeder.lines}
+    for piece in pieces:
+        if piece.line is not None:
+            for end in piece.ends:
+                volts.setdefault(end, volts[bus_of[piece.line]])
+    return np.array([volts[name] for name in order])
 
 
 def _equipped(tree: Tree) -> NDArray[np.bool_]:
-    """Per edge: a unit hangs below it. A loop's edges are fed from both ends, so always."""
+    """Per edge: something hangs below it. A loop's edges are fed from both ends, so always."""
     count = tree.parent.size
-    below = np.zeros(count + 1, np.bool_)
+    below = np.zeros(count + tree.tail.size, np.bool_)
     below[tree.unit_node] = True
+    below[tree.branch_node] = True
     for k in range(count - 1, 0, -1):
         below[tree.parent[k]] |= below[k]
     below[:count] |= tree.in_loop
-    below[count] = True
+    below[count:] = True
     return below

@@ -185,17 +185,19 @@ class Transformer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
-    """A load, behind a transformer that hangs on the feeder, or directly on a bus.
+    """A load, behind a transformer that hangs on the feeder, or directly on it.
 
     Behind a transformer with a Yg LV winding it is grounded wye, behind a D winding it is
     connected between the phases, and always balanced; ``connection`` and ``phases`` speak of
-    direct loads. Those have equal branches: wye, one from each of ``phases`` to earth; delta, one
-    between two phases or three around. ``kw`` is that of all branches at ``branch_kv`` each (None:
-    the bus's nominal voltage).
+    direct loads. Those have equal branches: wye, one from each of ``phases`` to earth; delta,
+    one between two phases, or three around. ``kw`` is that of all branches, at ``branch_kv``
+    across each (None: the bus's nominal voltage).
     P and Q vary as ``|V|**exponent``: 2 constant impedance, 1 current, 0 power; Q as
-    ``exponent_q`` where given; ``zip`` replaces both by shares of constant impedance, current and
-    power, P's then Q's. That holds from ``v_min_pu`` to ``v_max_pu``. Beyond, a branch is a constant
-    impedance, its last one; down to ``v_low_pu``, if given, it goes linearly back to the nominal one.
+    ``exponent_q`` where given; ``zip`` replaces both by shares of constant impedance, current
+    and power, P's then Q's. That holds from ``v_min_pu`` to ``v_max_pu``. Beyond, a branch is
+    a constant impedance, that at the limit: by its own law, or by ``edge_exponent`` there. Down
+    to ``v_low_pu``, if given, its current goes linearly with the voltage to that of the nominal
+    impedance, which it is from there on.
     ``motor_share`` of it are motors: they take it in the positive sequence, are
     ``motor_y2_y1`` times as large an admittance to the negative, and have no neutral.
     """
@@ -217,6 +219,7 @@ class Load:
     v_min_pu: float = 0.7
     v_max_pu: float | None = None
     v_low_pu: float | None = None
+    edge_exponent: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -242,7 +245,7 @@ class Der:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capacitor:
-    """A capacitor bank directly on the feeder: grounded wye or delta, equal branches as of a load."""
+    """A capacitor bank directly on the feeder, grounded wye or delta, with a load's branches."""
 
     name: str
     place: Place
@@ -256,10 +259,10 @@ class Capacitor:
 class Regulator:
     """Single-phase autotransformers between two buses, one for each of ``phases``.
 
-    Each makes the voltage at ``to_bus`` between its phase and its ``reference`` to be
-    ``1 + tap * step_pct / 100`` times that at ``from_bus``: earth (wye), one phase for the other two
-    (open delta), or the phase that follows (closed delta). ``z_ohm`` lies before each on the
-    from-side, ``jumper_ohm`` in the phase that others refer to.
+    Each adds ``tap * step_pct / 100`` of the voltage at ``from_bus`` between its phase and its
+    ``reference``: earth (wye), one phase for the other two (open delta), or the phase that
+    follows (closed delta). ``z_ohm`` lies before each on the from-side, ``jumper_ohm`` in the
+    phase that others refer to.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Lines cut where something stands, and the tree that these pieces and the switches form."""
+"""Lines cut where something stands, and the tree that these pieces and all else form."""
 
 from __future__ import annotations
 
@@ -9,8 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .parts import Capacitor, Der, Feeder, Line, Load, Place, Regulator, Switch, Transformer
-from .symmetrical import phase_matrix
+from .inline import bank_admittance, mask_of
+from .line_matrices import shunt_nf_per_km, z_ohm_per_km
+from .parts import (
+    Capacitor,
+    Der,
+    Feeder,
+    InlineTransformer,
+    Line,
+    LineCode,
+    Load,
+    Place,
+    Regulator,
+    Switch,
+    Transformer,
+)
+from .phases import conductors, phase_mask
 
 __all__ = [
     "NO_PHASES",
@@ -28,21 +42,24 @@ NO_PHASES: NDArray[np.complex128] = np.zeros((3, 3), np.complex128)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Piece:
-    """A stretch of line between two nodes, or a closed switch or regulator (``line`` None)."""
+    """A stretch of line between two nodes; a closed switch, a regulator or a bank elsewhere."""
 
     line: str | None
     regulator: str | None = None
-    ends: tuple[str, str]  #: node names, in the direction of the line or regulator
+    bank: str | None = None  #: the first of its in-line transformers
+    ends: tuple[str, str]  #: node names, in the direction of the line or other part
+    phases: tuple[int, int] = (0b111, 0b111)  #: masks of the conductors at either end
     start: float  #: fraction of the line at the first end
     stop: float  #: and at the second
     length_km: float
     z_ohm: NDArray[np.complex128]  #: (3, 3)
     end_y_s: NDArray[np.complex128]  #: (3, 3) half of the charging
+    bank_s: NDArray[np.complex128] | None = None  #: (6, 6) admittance of a bank
 
     @property
     def key(self) -> tuple[str | None, tuple[str, str]]:
         """What tells this piece from all others, in whichever state the network is."""
-        return self.line, self.ends
+        return self.line or self.bank or self.regulator, self.ends
 
 
 def check_fed(feeder: Feeder, pieces: list[Piece], order: list[str]) -> None:
@@ -95,35 +112,78 @@ def _places(feeder: Feeder) -> list[Place]:
 
 
 def pieces_of(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) -> list[Piece]:
-    """All stretches of line, then the closed switches, then the regulators."""
+    """All stretches of line, then the closed switches, the regulators and the banks."""
     cuts: dict[str, set[float]] = defaultdict(set)
     for place in _places(feeder):
         if place.line is not None and place.at is not None:
             cuts[place.line].add(place.at)
     omega = 2.0 * np.pi * feeder.source.frequency_hz
+    codes = {code.name: code for code in feeder.codes}
+    behind: dict[str, dict[str, str]] = defaultdict(dict)
+    for point in feeder.points:
+        if point.name in opened:
+            behind[point.line][point.bus] = point.name
     pieces = []
     for line in feeder.lines:
-        own = [p for p in feeder.points if p.line == line.name and p.name in opened]
-        detached = {point.bus: point.name for point in own}
-        pieces += _cut(line, cuts[line.name], detached, omega)
+        pieces += _cut(line, codes, cuts[line.name], behind[line.name], omega)
     joining: list[Regulator | Switch] = [s for s in feeder.switches if s.name in closed]
     for part in [*joining, *feeder.regulators]:
+        mask = phase_mask(conductors(part) if isinstance(part, Regulator) else part.phases)
+        name = part.name if isinstance(part, Regulator) else None
+        ends = (part.from_bus, part.to_bus)
+        pieces.append(_without_length(ends, (mask, mask), regulator=name))
+    return pieces + _banks(feeder)
+
+
+def _without_length(
+    ends: tuple[str, str],
+    phases: tuple[int, int],
+    *,
+    regulator: str | None = None,
+    bank: str | None = None,
+    bank_s: NDArray[np.complex128] | None = None,
+) -> Piece:
+    return Piece(
+        line=None,
+        regulator=regulator,
+        bank=bank,
+        ends=ends,
+        phases=phases,
+        start=0.0,
+        stop=1.0,
+        length_km=0.0,
+        z_ohm=NO_PHASES,
+        end_y_s=NO_PHASES,
+        bank_s=bank_s,
+    )
+
+
+def _banks(feeder: Feeder) -> list[Piece]:
+    """In-line transformers; those between the same two buses are one bank."""
+    together: dict[frozenset[str], list[InlineTransformer]] = defaultdict(list)
+    for unit in feeder.inline_transformers:
+        together[frozenset((unit.from_bus, unit.to_bus))].append(unit)
+    pieces = []
+    for units in together.values():
+        ends = (units[0].from_bus, units[0].to_bus)
         pieces.append(
-            Piece(
-                line=None,
-                regulator=part.name if isinstance(part, Regulator) else None,
-                ends=(part.from_bus, part.to_bus),
-                start=0.0,
-                stop=1.0,
-                length_km=0.0,
-                z_ohm=NO_PHASES,
-                end_y_s=NO_PHASES,
+            _without_length(
+                ends,
+                (mask_of(units, ends[0]), mask_of(units, ends[1])),
+                bank=units[0].name,
+                bank_s=bank_admittance(units, ends),
             )
         )
     return pieces
 
 
-def _cut(line: Line, at: set[float], detached: dict[str, str], omega: float) -> list[Piece]:
+def _cut(
+    line: Line,
+    codes: dict[str, LineCode],
+    at: set[float],
+    detached: dict[str, str],
+    omega: float,
+) -> list[Piece]:
     """The line between its tees; ``detached``: ends that an open recloser keeps from the bus."""
     fractions = sorted({0.0, 1.0, *at})
     ends = [
@@ -131,15 +191,16 @@ def _cut(line: Line, at: set[float], detached: dict[str, str], omega: float) -> 
         for bus in (line.from_bus, line.to_bus)
     ]
     names = [ends[0], *(_tee(line.name, x) for x in fractions[1:-1]), ends[1]]
-    whole = line.length_km * phase_matrix(
-        line.z0_ohm_per_km, line.z1_ohm_per_km, line.z1_ohm_per_km
-    )
-    siemens = 0.5j * omega * line.length_km * 1e-9
-    half = siemens * phase_matrix(line.c0_nf_per_km, line.c1_nf_per_km, line.c1_nf_per_km)
+    code = None if line.code is None else codes[line.code]
+    whole = line.length_km * z_ohm_per_km(line, code)
+    farad = 0.5e-9 * line.length_km * shunt_nf_per_km(line, code)
+    half = np.asarray(1j * omega * farad, np.complex128)
+    mask = phase_mask(line.phases)
     return [
         Piece(
             line=line.name,
             ends=(names[n], names[n + 1]),
+            phases=(mask, mask),
             start=fractions[n],
             stop=fractions[n + 1],
             length_km=line.length_km * (fractions[n + 1] - fractions[n]),
@@ -150,35 +211,32 @@ def _cut(line: Line, at: set[float], detached: dict[str, str], omega: float) -> 
     ]
 
 
-def span(feeder: Feeder, pieces: list[Piece]) -> tuple[list[str], dict[str, int], Piece | None]:
-    """Node names in depth-first order, each node's piece to its parent, and the chord."""
-    order, parent_piece, left = _walk(feeder.source.bus, pieces, set())
-    if not left:
-        return order, parent_piece, None
-    if len(left) > 1:
-        raise InputError.single(
-            feeder.name, "switches", f"{len(left)} loops", "must close at most one loop"
-        )
-    # depth-first, so the one piece left over joins a node to its own ancestor: the fork.
-    # Either of the loop's two pieces at the fork may be the chord; it must have impedance.
-    back = pieces[left[0]]
-    fork = min(back.ends, key=order.index)
-    tail = max(back.ends, key=order.index)
-    chain = [tail]
-    while (up := _other(pieces[parent_piece[chain[-1]]], chain[-1])) != fork:
-        chain.append(up)
-    first = parent_piece[chain[-1]]
-    if np.abs(back.z_ohm).max() == 0.0:
-        if np.abs(pieces[first].z_ohm).max() == 0.0:
+def span(feeder: Feeder, pieces: list[Piece]) -> tuple[list[str], dict[str, int], list[Piece]]:
+    """Node names in depth-first order, each node's piece to its parent, and the chords.
+
+    Depth-first, so that what is left over joins a node to an ancestor of its own: its fork. A
+    chord is a line, which has impedance: where a switch, say, is left over, the loop's other
+    piece at the fork takes its place, which leads from there into the loop.
+    """
+    without: set[int] = set()
+    while True:
+        order, parent_piece, left = _walk(feeder.source.bus, pieces, without)
+        bare = [n for n in left if pieces[n].line is None]
+        if not bare:
+            return order, parent_piece, [pieces[n] for n in sorted({*left, *without})]
+        back = pieces[bare[0]]
+        place = {name: n for n, name in enumerate(order)}
+        fork, tail = sorted(back.ends, key=place.__getitem__)
+        while (up := _other(pieces[parent_piece[tail]], tail)) != fork:
+            tail = up
+        if pieces[parent_piece[tail]].line is None:
             raise InputError.single(
                 feeder.name,
                 f"switches: the loop at bus '{fork}'",
-                "two switches or regulators",
+                "two switches, regulators or transformers",
                 "must leave the bus by a line on one side at least",
             )
-        order, parent_piece, _ = _walk(feeder.source.bus, pieces, {first})
-        return order, parent_piece, pieces[first]
-    return order, parent_piece, back
+        without.add(parent_piece[tail])
 
 
 def _other(piece: Piece, end: str) -> str:

@@ -75,11 +75,12 @@ def quiet_state(
 
 def new_answer(network: Network, probes: Probes, scenarios: int) -> Answer:
     """An empty answer whose fixed point starts from nominal voltages."""
+    windings = 4 * (len(network.units) + 1) + network.tree.branch_load.size
     return Answer(
         v=np.empty((probes.v_node.size, 3, scenarios), np.complex128),
         i=np.empty((probes.i_edge.size, 3, scenarios), np.complex128),
         stub=np.empty((2, 3, scenarios), np.complex128),
-        unit_v_pu=np.ones((len(network.units) + 1, 4, scenarios)),
+        winding_v_pu=np.ones((windings, scenarios)),
         machine_v1_v=np.zeros((network.machines.count, scenarios), np.complex128),
         flags=np.zeros(scenarios, np.int64),
         passes=np.zeros(scenarios, np.int64),
@@ -103,9 +104,9 @@ def solve(
         S scenarios.
     probes : Probes, optional
         Where to look; by default everywhere.
-    start : (U + 1, 4, S) array, optional
-        Winding voltages in pu from which the loads' fixed point starts, such as
-        ``unit_v_pu`` of the state before the event; by default nominal.
+    start : (N, S) array, optional
+        Winding and branch voltages in pu from which the loads' fixed point starts, such as
+        ``winding_v_pu`` of the state before the event; by default nominal.
     tolerance_pu : float
         Largest change of a winding voltage in the last pass.
 
@@ -123,7 +124,7 @@ def solve(
     probes = probes or all_probes(network)
     answer = new_answer(network, probes, state.emf_pu.size)
     work = workspace(network.tree)
-    answer.unit_v_pu[:] = 1.0 if start is None else start
+    answer.winding_v_pu[:] = 1.0 if start is None else start
     solve_block(network.tree, state, probes, work, answer, tolerance_pu, MOST_PASSES, FLOOR_PU)
     return answer
 
@@ -165,5 +166,8 @@ def _check(network: Network, state: State) -> None:
         raise ValueError("state.share must lie in 0..1")
     if np.any((state.far_node < -1) | (state.far_node >= len(network.nodes))):
         raise ValueError("state.far_node must be -1 or the index of a node")
+    here = network.tree.phases[edge]
+    if np.any((state.open_mask & ~here != 0) & (edge >= 0)):
+        raise ValueError("a scenario opens phases that its edge does not have")
     if np.any((state.open_mask != 0) & (edge < 0)):
         raise ValueError("a scenario opens phases, but on no edge")

@@ -11,43 +11,82 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NOT_CONVERGED", "Answer", "Probes", "State", "Tree", "Work", "workspace"]
+__all__ = [
+    "BY_LAW",
+    "NOT_CONVERGED",
+    "UNEARTHED",
+    "Answer",
+    "Probes",
+    "State",
+    "Tree",
+    "Work",
+    "unit_voltages",
+    "workspace",
+]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 NOT_CONVERGED = 4  #: flag: voltage-dependent loads did not settle
+UNEARTHED = 64  #: flag: nothing earths what lies behind an ungrounded winding
+BY_LAW = -1.0  #: exponent of a load that follows its own law
 
 
 class Tree(NamedTuple):
     """A compiled network of B nodes: what ``solve_block`` needs to know about it.
 
     Node k hangs on ``parent[k]`` by edge k; node 0 is the source bus, its edge the source
-    impedance. Parents come before children. Edge B is the chord, from ``tail`` to ``fork``.
+    impedance. Parents come before children. Edges B to B + C - 1 are chords, which close loops:
+    each is a line from its ``tail`` to an ancestor of that node, its ``fork``.
+    At the upper end of an edge may stand a regulator or a transformer: what arrives below it is
+    the voltage above times a matrix. At its lower end it may leave modes of the voltage loose,
+    into which it feeds no current: the common mode behind an ungrounded winding, or a phase
+    that the edge does not have and its node does.
     """
 
     parent: Int  #: (B,); -1 for node 0
-    z_ohm: Complex  #: (B + 1, 3, 3)
-    end_y_s: Complex  #: (B + 1, 3, 3) charging at each end of the edge, half of all it has
+    z_ohm: Complex  #: (B + C, 3, 3)
+    phases: Int  #: (B + C,) bit mask of the conductors, bit 0 for phase a
+    node_phases: Int  #: (B,) bit mask of the phases at each node
+    lone_phase: Int  #: (B,) of a plain edge with one phase, to a node with one; else -1
+    end_y_s: Complex  #: (B + C, 3, 3) charging at each end of the edge, half of all it has
     charged: bool  #: any edge has charging
-    regulator: Int  #: (B + 1,) row of ``State.ratio`` at the edge's upper end; -1: none
+    regulator: Int  #: (B,) row of ``State.ratio`` at the edge's upper end; -1: none
+    reference: Int  #: (R, 3) phase that a regulator's phase refers to, -1: earth
+    transformer: Int  #: (B,) row of ``turn``; -1: none
+    turn: Complex  #: (N, 3, 3) open-circuit voltage below per voltage above
+    loose_from: Int  #: (B + 1,) edge k has the modes ``loose_from[k]`` to ``loose_from[k + 1]``
+    loose: Real  #: (M, 3) the modes
     lifted: bool  #: the source's neutral is not solidly earthed
     neutral_y_s: complex  #: what stands between them; 0 where there is nothing
-    in_loop: NDArray[np.bool_]  #: (B,) the node is on the chain that the chord closes
-    fork: int  #: -1 where there is no loop
-    tail: int  #: -1 where there is no loop
-    shunt_s: Complex  #: (B, 3, 3) capacitors on each node
+    carried: NDArray[np.bool_]  #: (B, C) the edge is part of the chain that the chord closes
+    in_loop: NDArray[np.bool_]  #: (B,) of any such chain
+    fork: Int  #: (C,)
+    tail: Int  #: (C,)
+    chord_y_s: Complex  #: (C, 3, 3) inverse of the chord's impedance, in the phases it has
+    alone: NDArray[np.bool_]  #: (C, C) the identity: each chord by itself
+    shunt_s: Complex  #: (B, 3, 3) fixed shunts on each node: capacitors, charging, windings
     unit_node: Int  #: (U,)
+    unit_v: Real  #: (U,) nominal volts, phase to earth
     unit_zh_ohm: Complex  #: (U,)
     unit_zl_ohm: Complex  #: (U,)
     unit_y0_s: Complex  #: (U,) zero-sequence magnetizing admittance of a Yg/Yg unit
     unit_ym_s: Complex  #: (U,) magnetizing admittance
     unit_plain: NDArray[np.bool_]  #: (U,) neither machines nor magnetizing admittance
-    load_unit: Int  #: (L,)
-    load_y_s: Complex  #: (L,) per winding at nominal voltage
+    load_unit: Int  #: (L,) -1: a load with branches
+    load_y_s: Complex  #: (L,) per winding or branch at nominal voltage
+    law: Real  #: (L, 14) what `laws.law_rows` makes of the file's voltage dependence
+    law_linear: NDArray[np.bool_]  #: (L,) which is none at all
+    branch_load: Int  #: (P,)
+    branch_node: Int  #: (P,)
+    branch_from: Int  #: (P,) phase
+    branch_to: Int  #: (P,) phase, -1: earth
+    branch_v: Real  #: (P,) nominal volts across it
     machine_unit: Int  #: (M,) motors of loads, then DER
-    v_nominal_v: float  #: phase to earth
+    node_v: Real  #: (B,) nominal volts, phase to earth
+    v_nominal_v: float  #: phase to earth, of the source
+    emf_turn: complex  #: unit phasor of its phase a
 
 
 class State(NamedTuple):
@@ -61,7 +100,7 @@ class State(NamedTuple):
 
     emf_pu: Real  #: (S,)
     load_scale: Real  #: (L, S) factor on every load
-    exponent: Real  #: (L, S)
+    exponent: Real  #: (L, S); `BY_LAW` where a load follows its own law
     connection: Int  #: (U, S)
     ratio: Real  #: (R, 3, S) of regulators, lower over upper voltage
     machine_va: Complex  #: (M, S) taken by all three phases at nominal voltage, P + jQ
@@ -97,26 +136,34 @@ class Answer(NamedTuple):
     v: Complex  #: (len(v_node), 3, S)
     i: Complex  #: (len(i_edge), 3, S)
     stub: Complex  #: (2, 3, S) the event node: upper stub p, lower stub q
-    unit_v_pu: Real  #: (U + 1, 4, S) |V| across each LV winding, then |V1|; last row stub p
+    winding_v_pu: Real  #: (4 (U + 1) + P, S) of units |V| across three windings and |V1|; of
+    #: stub p likewise; of branches |V| across
     machine_v1_v: Complex  #: (M, S) positive-sequence winding voltage
     flags: Int  #: (S,)
     passes: Int  #: (S,)
 
 
-class Work(NamedTuple):
-    """Scratch space of one scenario in a network of B nodes, U units and M machines.
+def unit_voltages(answer: Answer, units: int) -> Real:
+    """(U + 1, 4, S) what ``winding_v_pu`` holds of units, and of stub p in the last row."""
+    return answer.winding_v_pu[: 4 * (units + 1)].reshape(units + 1, 4, -1)
 
-    Row B is the chord, where there is one. A matrix with "per V_fork" in its description has
-    a companion vector ``..._j``: the part that neither voltage but the machines' currents make.
+
+class Work(NamedTuple):
+    """Scratch space of one scenario in a network of B nodes, C chords, U units, P branches.
+
+    A matrix with "per V_fork" in its description stands for every chord c whose chain the edge
+    is part of, the companion vector ``..._j`` for the part that no voltage but the machines'
+    currents make.
     """
 
     y: Complex  #: (B, 3, 3) admittance below each node
     f: Complex  #: (B, 3, 3) V_node per V_parent
-    h: Complex  #: (B, 3, 3) V_node per V_fork
+    h: Complex  #: (B, C, 3, 3) V_node per V_fork
     h_j: Complex  #: (B, 3)
-    w: Complex  #: (B + 1, 3, 3) current into each edge's upper end, per voltage there
-    x: Complex  #: (B + 1, 3, 3) the same per V_fork
-    x_j: Complex  #: (B + 1, 3)
+    w: Complex  #: (B, 3, 3) current into each edge's upper end, per voltage there
+    x: Complex  #: (B, C, 3, 3) the same per V_fork
+    x_j: Complex  #: (B, 3)
+    x_low: Complex  #: (B, C, 3, 3) below a transformer or regulator, per V_fork
     y_j: Complex  #: (B, 3) current drawn below each node that depends on no voltage
     v: Complex  #: (B + 1, 3); the last row is the EMF
     g: Complex  #: (U, 3, 3) winding voltage per bus voltage
@@ -124,23 +171,27 @@ class Work(NamedTuple):
     unit_y: Complex  #: (U, 3, 3) across the LV windings
     unit_j: Complex  #: (U, 3) fed in there
     event_y: Complex  #: (2, 3, 3) shunts at p and q
-    fill: Complex  #: (2, 3, 3) the loop's running X' and U
-    fill_j: Complex  #: (1, 3) of U
-    chord_end: Complex  #: (2, 3, 3) current from the fork into the chord, per V_tail and V_fork
-    here: Complex  #: (7, 3, 3) a break's W, X, X', U, P, H, and scratch
-    here_j: Complex  #: (3, 3) the companions of X, U and H
-    event: Complex  #: (6, 3, 3) F and H above the event node, P and H at it, F and H below
-    event_j: Complex  #: (3, 3) the companions of the three H
+    xt: Complex  #: (C, 3, 3) each loop's running X'
+    u: Complex  #: (C, C, 3, 3) and U
+    u_j: Complex  #: (C, 3)
+    chord: Complex  #: (4, C, 3, 3) current into the chord per V_tail, V_fork; back per the same
+    here: Complex  #: (3, 3, 3) at a break: W, P, and scratch
+    here_j: Complex  #: (2, 3) the companions of X and H
+    here_x: Complex  #: (C, 3, 3) X
+    here_h: Complex  #: (C, 3, 3) H
+    row: Complex  #: (C, 3) scratch
+    event: Complex  #: (3, 3, 3) F above the event node, P at it, F below
+    event_h: Complex  #: (3, C, 3, 3) the H of these
+    event_j: Complex  #: (3, 3) their companions
     stub: Complex  #: (2, 3) voltages of p and q
-    i_up: Complex  #: (B + 1, 3) current into each edge's upper end
-    i_low: Complex  #: (B + 1, 3) current out of its lower end
-    unit_v_pu: Real  #: (U + 1, 4) the scenario's ``Answer.unit_v_pu``
-    history: Real  #: (3, U + 1, 4) of these: the last pass's, its gaps, and this pass's gaps
+    winding_v_pu: Real  #: (N,) the scenario's ``Answer.winding_v_pu``
+    history: Real  #: (3, N) of these: the last pass's, its gaps, and this pass's gaps
 
 
 def workspace(tree: Tree) -> Work:
     """Scratch for a network."""
-    nodes, units = tree.parent.size, tree.unit_node.size
+    nodes, units, chords = tree.parent.size, tree.unit_node.size, tree.tail.size
+    windings = 4 * (units + 1) + tree.branch_node.size
 
     def zeros(*shape: int) -> Complex:
         return np.zeros(shape, np.complex128)
@@ -148,11 +199,12 @@ def workspace(tree: Tree) -> Work:
     return Work(
         y=zeros(nodes, 3, 3),
         f=zeros(nodes, 3, 3),
-        h=zeros(nodes, 3, 3),
+        h=zeros(nodes, chords, 3, 3),
         h_j=zeros(nodes, 3),
-        w=zeros(nodes + 1, 3, 3),
-        x=zeros(nodes + 1, 3, 3),
-        x_j=zeros(nodes + 1, 3),
+        w=zeros(nodes, 3, 3),
+        x=zeros(nodes, chords, 3, 3),
+        x_j=zeros(nodes, 3),
+        x_low=zeros(nodes, chords, 3, 3),
         y_j=zeros(nodes, 3),
         v=zeros(nodes + 1, 3),
         g=zeros(units, 3, 3),
@@ -160,16 +212,19 @@ def workspace(tree: Tree) -> Work:
         unit_y=zeros(units, 3, 3),
         unit_j=zeros(units, 3),
         event_y=zeros(2, 3, 3),
-        fill=zeros(2, 3, 3),
-        fill_j=zeros(1, 3),
-        chord_end=zeros(2, 3, 3),
-        here=zeros(7, 3, 3),
-        here_j=zeros(3, 3),
-        event=zeros(6, 3, 3),
+        xt=zeros(chords, 3, 3),
+        u=zeros(chords, chords, 3, 3),
+        u_j=zeros(chords, 3),
+        chord=zeros(4, chords, 3, 3),
+        here=zeros(3, 3, 3),
+        here_j=zeros(2, 3),
+        here_x=zeros(chords, 3, 3),
+        here_h=zeros(chords, 3, 3),
+        row=zeros(chords, 3),
+        event=zeros(3, 3, 3),
+        event_h=zeros(3, chords, 3, 3),
         event_j=zeros(3, 3),
         stub=zeros(2, 3),
-        i_up=zeros(nodes + 1, 3),
-        i_low=zeros(nodes + 1, 3),
-        unit_v_pu=np.zeros((units + 1, 4)),
-        history=np.zeros((3, units + 1, 4)),
+        winding_v_pu=np.zeros(windings),
+        history=np.zeros((3, windings)),
     )

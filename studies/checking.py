@@ -164,7 +164,7 @@ def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: 
     """Nominal kW of load beyond the section's first edge, or beyond its last."""
     path = [int(k) for k in np.flatnonzero(terminal.on_path)]
     edge = min(path) if nearest else max(path)
-    loaded = network.below(edge)[network.tree.unit_node[network.tree.load_unit]]
+    loaded = network.below(edge)[network.load_node]
     return float(sum(load.kw for load, own in zip(feeder.loads, loaded, strict=True) if own))
 
 

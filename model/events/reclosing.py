@@ -29,7 +29,6 @@ def draw_reclosing(
     that had no supply.
     """
     event = draw_energisation(rng, size, network, regions)
-    tree = network.tree
-    dead = fed_through(network, event.edge, tree.unit_node[tree.load_unit])
+    dead = fed_through(network, event.edge, network.load_node)
     factor = cold_load.draw(rng, size)
     return replace(event, load_factor=np.where(dead, factor, 1.0))

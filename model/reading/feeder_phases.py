@@ -115,8 +115,7 @@ def check_volts(feeder: Feeder, report: Report) -> None:
                 ways.append(((table, index), part.to_bus, volts[part.from_bus]))
     for index, unit in enumerate(feeder.inline_transformers):
         if unit.from_bus in volts and unit.name not in backwards:
-            path = ("inline_transformers", index, "kv_to")
-            ways.append((path, unit.to_bus, to_side_volts(unit)))
+            ways.append((("inline_transformers", index, "kv_to"), unit.to_bus, to_side_volts(unit)))
     for path, bus, brought in ways:
         if abs(brought - volts[bus]) > _TOLERANCE * volts[bus]:
             rule = (

@@ -49,6 +49,8 @@ def _determinant(code: LineCode) -> complex:
     """Determinant of R + jX, its rows and columns scaled to a diagonal of 1."""
     size = range(len(code.r_ohm_per_km))
     z = [[complex(code.r_ohm_per_km[i][j], code.x_ohm_per_km[i][j]) for j in size] for i in size]
+    if any(z[i][i] == 0 for i in size):
+        return 0j
     scaled = [[z[i][j] / (z[i][i] * z[j][j]) ** 0.5 for j in size] for i in size]
     if len(scaled) == 1:
         return scaled[0][0]
@@ -125,13 +127,8 @@ def _check_inline(unit: InlineTransformer, index: int, own: OwnChecks) -> None:
 
 def _check_windings(unit: InlineTransformer, index: int, own: OwnChecks) -> None:
     """The phases of either side are as many as the connection has there."""
-    if unit.connection == "single":
-        wanted = {"phases": (1, 2), "to_phases": (1, 2)}
-    elif unit.connection == "centre-tap":
-        wanted = {"phases": (1, 2), "to_phases": (2,)}
-    else:
-        wanted = {"phases": (3,), "to_phases": (3,)}
-    for key, counts in wanted.items():
+    here, there = _WINDINGS.get(unit.connection, ((3,), (3,)))
+    for key, counts in (("phases", here), ("to_phases", there)):
         found = getattr(unit, key)
         if len(found) not in counts:
             words = " or ".join(_COUNTS[count] for count in counts)
@@ -140,6 +137,10 @@ def _check_windings(unit: InlineTransformer, index: int, own: OwnChecks) -> None
             own.add(path, ("connection",), rule, repr(found))
 
 
+_WINDINGS: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
+    "single": ((1, 2), (1, 2)),
+    "centre-tap": ((1, 2), (2,)),
+}
 _COUNTS = {1: "one phase", 2: "two phases", 3: "all three"}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..parts import Feeder, Origin, OriginKey
@@ -66,22 +66,24 @@ def _assumes(field: Field) -> bool:
 
 def _concerns(table: str, field: str, row: _Row) -> bool:
     """Whether the field says anything about a row with these values."""
-    match table, field:
-        case "loads", "connection" | "phases" | "branch_kv":
-            return row["transformer"] is None
-        case "loads", "power_factor":
-            return row["kvar"] is None
-        case "loads", "exponent":
-            return row["zip"] is None
-        case "lines", "c1_nf_per_km" | "c0_nf_per_km":
-            return row["code"] is None
-        case "transformers", "x0_pu":
-            return row["connection"] in ("Yg/Yg", "unknown")
-        case "inline_transformers", _:
-            return _concerns_inline(field, row["connection"])
-        case "regulators", "jumper_ohm":
-            return row["reference"] in ("a", "b", "c")
-    return True
+    if table == "inline_transformers":
+        return _concerns_inline(field, row["connection"])
+    concerns = _CONCERNS.get((table, field))
+    return concerns is None or concerns(row)
+
+
+_CONCERNS: dict[tuple[str, str], Callable[[_Row], bool]] = {
+    ("loads", "connection"): lambda row: row["transformer"] is None,
+    ("loads", "phases"): lambda row: row["transformer"] is None,
+    ("loads", "branch_kv"): lambda row: row["transformer"] is None,
+    ("loads", "power_factor"): lambda row: row["kvar"] is None,
+    ("loads", "exponent"): lambda row: row["zip"] is None,
+    ("lines", "c1_nf_per_km"): lambda row: row["code"] is None,
+    ("lines", "c0_nf_per_km"): lambda row: row["code"] is None,
+    ("transformers", "x0_pu"): lambda row: row["connection"] in ("Yg/Yg", "unknown"),
+    ("regulators", "jumper_ohm"): lambda row: row["reference"] in ("a", "b", "c"),
+}
+"""Where that depends on other values of the row."""
 
 
 def _concerns_inline(field: str, connection: str) -> bool:

@@ -25,7 +25,7 @@ CODES: tuple[Field, ...] = (
         name="x_ohm_per_km",
         kind="matrix",
         unit="ohm/km",
-        above=0.0,
+        low=0.0,
         required=True,
         doc="Series reactance at the source's frequency.",
     ),
@@ -35,7 +35,7 @@ CODES: tuple[Field, ...] = (
         unit="nF/km",
         low=0.0,
         absent="no charging",
-        doc="Nodal capacitance: those between conductors are negative off the diagonal.",
+        doc="Nodal capacitance: off the diagonal, what is between conductors counts negative.",
     ),
 )
 
@@ -47,7 +47,7 @@ LINES: tuple[Field, ...] = (
         name="length_km", kind="number", unit="km", above=0.0, required=True, doc="Route length."
     ),
     replace(PHASES, doc="The conductors it has, in the order of its code's rows."),
-    Field(name="code", kind="name", doc="How it is built; or give `z1_ohm_per_km` and z0."),
+    Field(name="code", kind="name", doc="How it is built; or give `z1_ohm_per_km` and `z0_ohm_per_km`."),
     Field(
         name="z1_ohm_per_km",
         kind="impedance",
@@ -137,7 +137,7 @@ INLINE_TRANSFORMERS: tuple[Field, ...] = (
         unit="pu",
         high=1.0,
         required=True,
-        doc="Leakage, all of it; of `centre-tap` the from-winding's branch of the star. Not 0.",
+        doc="Leakage, not 0; of `centre-tap` the from-winding's branch of the star, which may be 0.",
     ),
     Field(
         name="leg_leakage_pu",
@@ -185,7 +185,7 @@ INLINE_TRANSFORMERS: tuple[Field, ...] = (
         kind="text",
         choices=("lag", "lead"),
         default="lag",
-        doc="What `to` does by 30 degrees behind `D/Yg`, `D/Y`, `Yg/D` and `Y/D`.",
+        doc="What phase a does at `to`, by 30 degrees, where one side is D and the other Y.",
     ),
     Field(
         name="from_neutral_ohm",
@@ -238,7 +238,7 @@ REGULATORS: tuple[Field, ...] = (
         choices=("earth", "a", "b", "c", "next"),
         refused=refused.REFERENCES,
         default="earth",
-        doc="What each unit's voltage is to: earth, a phase (open delta), the `next` phase (closed).",
+        doc="What each unit's voltage is to: earth, a phase (open delta), the `next` one (closed).",
     ),
     Field(
         name="z_ohm",

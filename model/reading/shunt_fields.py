@@ -41,8 +41,8 @@ _BRANCH_KV = Field(
     unit="kV",
     above=0.0,
     high=1000.0,
-    absent="the bus's nominal",
-    doc="Voltage of each branch at which it takes its power.",
+    absent="nominal",
+    doc="At which each branch takes its power: by default the bus's, between phases for a delta.",
 )
 
 TRANSFORMERS: tuple[Field, ...] = (

@@ -184,7 +184,8 @@ def _read_matrix(value: object, field: Field) -> tuple[tuple[float, ...], ...]:
     rows = value if isinstance(value, list) else []
     found = [[_finite(item) for item in row] if isinstance(row, list) else [] for row in rows]
     matrix = [[item for item in row if item is not None] for row in found]
-    if not 1 <= len(rows) <= 3 or any(len(row) != len(rows) for row in (*found, *matrix)):
+    sizes = {len(row) for row in found} | {len(row) for row in matrix}
+    if not 1 <= len(rows) <= 3 or sizes != {len(rows)}:
         raise _UnfitError(f"must be {describe_field(field)}")
     for i, row in enumerate(matrix):
         _check_bounds(row[i], field, "have a diagonal ")
@@ -264,7 +265,7 @@ _STAND_INS: dict[Kind, object] = {
 def _stand_in(field: Field) -> object:
     if field.kind in ("numbers", "integers") and field.count is not None:
         return (0,) * field.count
-    return field.choices[0] if field.choices else _STAND_INS[field.kind]
+    return field.choices[0] if field.choices else _STAND_INS.get(field.kind)
 
 
 def _finite(value: object) -> float | None:

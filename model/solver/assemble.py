@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
+from ..compiled import compiled, compiled_apart
 from ..states import State, Tree, Work
 from .bank import YG_D, bank, plain_bank
 from .matrix3 import ZERO, add, load, load_vector, plus, scaled, store, store_vector
@@ -20,18 +20,18 @@ Real = NDArray[np.float64]
 
 
 @compiled
-def set_admittances(
-    tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
-) -> None:
-    """What hangs on every node and on the event node, at the winding voltages ``unit_v_pu``."""
-    set_loads(tree, state, work, s, unit_v_pu, floor_pu)
+def set_admittances(tree: Tree, state: State, work: Work, s: int, floor_pu: float) -> None:
+    """What hangs on every node and on the event node, at the work's winding voltages."""
+    set_units(tree, state, work, s, floor_pu)
     y, y_j, g, unit_y = work.y, work.y_j, work.g, work.unit_y
     unit_node, plain, connections = tree.unit_node, tree.unit_plain, state.connection
     zh, zl, y0 = tree.unit_zh_ohm, tree.unit_zl_ohm, tree.unit_y0_s
     shunts = tree.shunt_s
     for k in range(y.shape[0]):
         store(y, k, load(shunts, k))
-        store_vector(y_j, k, (0j, 0j, 0j))
+    if tree.machine_unit.size > 0:
+        for k in range(y.shape[0]):
+            store_vector(y_j, k, (0j, 0j, 0j))
     for unit in range(unit_node.size):
         node, connection = unit_node[unit], connections[unit, s]
         if not plain[unit] or connection > YG_D:
@@ -41,17 +41,84 @@ def set_admittances(
         shunt, winding = plain_bank(connection, zh[unit], zl[unit], y0[unit], across)
         store(y, node, add(load(y, node), shunt))
         store(g, unit, winding)
-    if tree.charged:
-        add_charging(tree, work, state.edge[s])
+    add_branches(tree, state, work, s, floor_pu)
     node = state.far_node[s]
     if node >= 0:
         far_y, far_between_y = state.far_y_s, state.far_between_y_s
         for i in range(3):
             add_shunt(y, node, i, far_y[i, s], far_between_y[i, s])
-    set_event_shunts(tree, state, work, s, unit_v_pu, floor_pu)
+    set_event_shunts(tree, state, work, s, floor_pu)
 
 
 @compiled
+def add_branches(tree: Tree, state: State, work: Work, s: int, floor_pu: float) -> None:
+    """The branches of loads that stand on a bus themselves."""
+    node, first, other, of_load = (
+        tree.branch_node,
+        tree.branch_from,
+        tree.branch_to,
+        tree.branch_load,
+    )
+    y, winding_v_pu, at = work.y, work.winding_v_pu, 4 * (tree.unit_node.size + 1)
+    for p in range(node.size):
+        k, i, j = node[p], first[p], other[p]
+        own = load_admittance(tree, state, of_load[p], s, winding_v_pu[at + p], floor_pu)
+        y[k, i, i] += own
+        if j >= 0:
+            y[k, j, j] += own
+            y[k, i, j] -= own
+            y[k, j, i] -= own
+
+
+@compiled
+def load_admittance(
+    tree: Tree, state: State, n: int, s: int, v_pu: float, floor_pu: float
+) -> complex:
+    """Admittance of one winding or branch of load n at the voltage across it."""
+    nominal = complex(tree.load_y_s[n] * state.load_scale[n, s])
+    exponent = state.exponent[n, s]
+    if exponent == 2.0:
+        return nominal
+    if exponent >= 0.0:
+        return nominal * voltage_factor(v_pu, exponent - 2.0, floor_pu)
+    if tree.law_linear[n]:
+        return nominal
+    real, imag = law_factors(tree.law, n, v_pu)
+    return complex(nominal.real * real, nominal.imag * imag)
+
+
+@compiled_apart
+def law_factors(law: Real, n: int, v_pu: float) -> tuple[float, float]:
+    """Conductance and susceptance over their nominal values, by the law of load n.
+
+    Beyond its limits it is the impedance at the limit. Where that ends at a lower voltage, the
+    current goes linearly with the voltage from one limit to the other.
+    """
+    least, most, low, beyond = law[n, 10], law[n, 11], law[n, 12], law[n, 13]
+    v = min(max(v_pu, least), most)
+    if v != v_pu and beyond >= 0.0:
+        real = imag = v ** (beyond - 2.0)
+    else:
+        real, imag = part_factor(law, n, 0, v), part_factor(law, n, 5, v)
+    if v_pu < least and low > 0.0:
+        if v_pu <= low:
+            return 1.0, 1.0
+        part = (v_pu - low) / (least - low)
+        real = (low + (least * real - low) * part) / v_pu
+        imag = (low + (least * imag - low) * part) / v_pu
+    return real, imag
+
+
+@compiled
+def part_factor(law: Real, n: int, at: int, v: float) -> float:
+    """Of the active (0) or reactive (5) part, within the limits."""
+    factor = law[n, at] + law[n, at + 1] / v + law[n, at + 2] / (v * v)
+    if law[n, at + 4] != 0.0:
+        factor += law[n, at + 4] * v ** (law[n, at + 3] - 2.0)
+    return float(factor)
+
+
+@compiled_apart
 def hang_bank(tree: Tree, work: Work, unit: int, connection: int) -> None:
     """Hang a bank with machines, a magnetizing branch or rarer windings on its node."""
     y, y_j, node = work.y, work.y_j, tree.unit_node[unit]
@@ -71,31 +138,30 @@ def hang_bank(tree: Tree, work: Work, unit: int, connection: int) -> None:
 
 
 @compiled
-def set_loads(
-    tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
-) -> None:
+def set_units(tree: Tree, state: State, work: Work, s: int, floor_pu: float) -> None:
     """Admittance across the LV windings of every unit, and the current fed in there."""
-    unit_y, unit_j = work.unit_y, work.unit_j
-    load_unit, load_y, machine_unit = tree.load_unit, tree.load_y_s, tree.machine_unit
-    load_scale, exponent = state.load_scale, state.exponent
+    unit_y, unit_j, v_pu, unit_v = work.unit_y, work.unit_j, work.winding_v_pu, tree.unit_v
+    load_unit, machine_unit = tree.load_unit, tree.machine_unit
     machine_va, machine_y, machine_j = state.machine_va, state.machine_y_s, state.machine_j_a
     follows = state.machine_exponent
+    if unit_y.shape[0] == 0:
+        return
     for unit in range(unit_y.shape[0]):
         store(unit_y, unit, ZERO)
         store_vector(unit_j, unit, (0j, 0j, 0j))
     for n in range(load_unit.size):
         unit = load_unit[n]
-        nominal = load_y[n] * load_scale[n, s]
-        power = exponent[n, s] - 2.0
-        for i in range(3):
-            unit_y[unit, i, i] += nominal * voltage_factor(unit_v_pu[unit, i], power, floor_pu)
+        if unit >= 0:
+            for i in range(3):
+                own = load_admittance(tree, state, n, s, v_pu[4 * unit + i], floor_pu)
+                unit_y[unit, i, i] += own
     turn = complex(-0.5, 0.75**0.5)
     for m in range(machine_unit.size):
         unit = machine_unit[m]
         power = follows[m, s] - 2.0
-        taken = machine_va[m, s].conjugate() / (3.0 * tree.v_nominal_v**2)
+        taken = machine_va[m, s].conjugate() / (3.0 * unit_v[unit] ** 2)
         y0, y2 = machine_y[m, 0, s], machine_y[m, 2, s]
-        y1 = machine_y[m, 1, s] + taken * voltage_factor(unit_v_pu[unit, 3], power, floor_pu)
+        y1 = machine_y[m, 1, s] + taken * voltage_factor(v_pu[4 * unit + 3], power, floor_pu)
         own = (y0 + y1 + y2) / 3.0
         ahead = (y0 + turn * y1 + turn.conjugate() * y2) / 3.0
         behind = (y0 + turn.conjugate() * y1 + turn * y2) / 3.0
@@ -123,24 +189,8 @@ def add_shunt(stack: Complex, k: int, i: int, earth: complex, between: complex) 
     stack[k, following, i] -= between
 
 
-@compiled
-def add_charging(tree: Tree, work: Work, edge: int) -> None:
-    """Half of every edge's charging at its ends; of the event's edge the parts beyond it."""
-    y, parents, end_y = work.y, tree.parent, tree.end_y_s
-    last = parents.size
-    for k in range(1, last + (1 if tree.tail >= 0 else 0)):
-        if k == edge:
-            continue
-        half = load(end_y, k)
-        upper, lower = (tree.tail, tree.fork) if k == last else (parents[k], k)
-        store(y, upper, add(load(y, upper), half))
-        store(y, lower, add(load(y, lower), half))
-
-
-@compiled
-def set_event_shunts(
-    tree: Tree, state: State, work: Work, s: int, unit_v_pu: Real, floor_pu: float
-) -> None:
+@compiled_apart
+def set_event_shunts(tree: Tree, state: State, work: Work, s: int, floor_pu: float) -> None:
     """Shunts at p and q; and the charging of the two parts of the event's edge."""
     event_y, edge, share = work.event_y, state.edge[s], state.share[s]
     store(event_y, 0, ZERO)
@@ -148,20 +198,25 @@ def set_event_shunts(
     if edge < 0:
         return
     step_y, between_y, fallen_y = state.step_y_s, state.between_y_s, state.fallen_y_s
-    power = state.step_exponent[s] - 2.0
+    at, power = 4 * tree.unit_node.size, state.step_exponent[s] - 2.0
     for i in range(3):
-        factor = voltage_factor(unit_v_pu[-1, i], power, floor_pu)
+        factor = voltage_factor(work.winding_v_pu[at + i], power, floor_pu)
         add_shunt(event_y, 0, i, step_y[i, s] * factor, between_y[i, s])
         event_y[1, i, i] += fallen_y[i, s]
     if tree.charged:
         half = load(tree.end_y_s, edge)
         above, below = scaled(half, share), scaled(half, 1.0 - share)
         last = tree.parent.size
-        upper, lower = (tree.tail, tree.fork) if edge == last else (tree.parent[edge], edge)
+        upper, lower = (
+            (tree.tail[edge - last], tree.fork[edge - last])
+            if edge >= last
+            else (tree.parent[edge], edge)
+        )
         store(event_y, 0, add(load(event_y, 0), above))
         store(event_y, 1, add(load(event_y, 1), below))
-        store(work.y, upper, add(load(work.y, upper), above))
-        store(work.y, lower, add(load(work.y, lower), below))
+        # the nodes hold half of the whole edge's
+        store(work.y, upper, add(load(work.y, upper), scaled(below, -1.0)))
+        store(work.y, lower, add(load(work.y, lower), scaled(above, -1.0)))
 
 
 @compiled

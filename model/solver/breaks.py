@@ -1,12 +1,14 @@
-"""Open phases: projections of the three-phase equations at a break.
+"""Voltages that come loose: open phases at a break, and modes that a transformer leaves free.
 
-Below the break the network draws  I = W V + X V_fork + x  from it, and  I' = X' V + U V_fork + u
-from the loop's fork (X, X', U and u are zero where the break is in no loop, x and u where no
-machine feeds in current). An open phase a has no current, so
+Below such a place the network draws  I = W V + sum X_c V_c + x  from it, and  I' = X'_c V +
+sum U_cd V_d + u  from the fork of each loop c whose chain runs through it (x and u where machines
+feed in current). Along a loose mode e no current flows: e' I = 0. The voltage below is that above
+plus a multiple of the mode,
 
-    V_a = -(sum_{b != a} w_ab V_b + x_ab V_fork + x_a) / w_aa
+    t = -(e' W V + sum e' X_c V_c + e' x) / (e' W e),
 
-replaces V_a everywhere; phase by phase, so that one, two or three phases are one thing.
+which goes everywhere; mode by mode, so that one, two or three are one thing. An open phase is
+the mode of that phase alone.
 """
 
 from __future__ import annotations
@@ -14,12 +16,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
+from ..compiled import compiled, compiled_apart
+from ..states import UNEARTHED, Tree, Work
 from .matrix3 import IDENTITY, ZERO, reciprocal, store, store_vector
 
-__all__ = ["DEAD", "FLOATING", "NOTHING_S", "SINGULAR", "UNDEFINED", "open_phases", "squared"]
+__all__ = [
+    "DEAD",
+    "FLOATING",
+    "NOTHING_S",
+    "SINGULAR",
+    "UNDEFINED",
+    "free_modes",
+    "open_phases",
+    "squared",
+]
 
-Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
 
 DEAD = 1  #: an opened conductor's far side is connected to nothing, or to no source
 FLOATING = 2  #: an opened conductor's far side has equipment, but no way to earth
@@ -30,24 +42,32 @@ NOTHING_S = 1e-12  #: and so does one below this, which idle windings leave of r
 
 
 @compiled
-def open_phases(mask: int, here: Complex, here_j: Complex) -> int:
-    """Open the phases in ``mask``; returns flags.
-
-    ``here`` (7, 3, 3) holds W, X, X', U and ``here_j`` (3, 3) x and u, changed in place; they
-    receive P, H and h: the voltage below the break is P V + H V_fork + h, V the voltage
-    above it. A phase that is connected to nothing or to no earth below gets zero volts and a
-    flag. The last slot of ``here`` is scratch.
-    """
-    w, x, xt, u, p, h, row = here[0], here[1], here[2], here[3], here[4], here[5], here[6]
-    x_j, u_j, h_j = here_j[0], here_j[1], here_j[2]
-    store(here, 4, IDENTITY)
-    store(here, 5, ZERO)
-    store_vector(here_j, 2, (0j, 0j, 0j))
+def start(work: Work, carried: Flags) -> float:
+    """P is the identity, H is zero; returns the square of what counts as no admittance."""
+    w = work.here[0]
+    store(work.here, 1, IDENTITY)
+    store_vector(work.here_j, 1, (0j, 0j, 0j))
+    for c in range(carried.size):
+        if carried[c]:
+            store(work.here_h, c, ZERO)
     largest = 0.0
     for i in range(3):
         for j in range(3):
             largest = max(largest, squared(w[i, j]))
-    limit = max(SINGULAR**2 * largest, NOTHING_S**2)
+    return max(SINGULAR**2 * largest, NOTHING_S**2)
+
+
+@compiled_apart
+def open_phases(mask: int, work: Work, carried: Flags) -> int:
+    """Open the phases in ``mask``; returns flags.
+
+    ``work.here`` holds W first, ``here_x`` X and ``here_j`` x, changed in place like the running
+    X', U and u; they receive P, H and h: the voltage below the break is P V + sum H V_fork + h,
+    V the voltage above it. A phase that is connected to nothing or to no earth below gets zero
+    volts and a flag.
+    """
+    w, p = work.here[0], work.here[1]
+    limit = start(work, carried)
     empty = 0
     for i in range(3):
         if max(squared(w[i, 0]), squared(w[i, 1]), squared(w[i, 2])) <= limit:
@@ -56,40 +76,150 @@ def open_phases(mask: int, here: Complex, here_j: Complex) -> int:
     for a in range(3):
         if not mask & (1 << a):
             continue
-        # V_a = row[0] V + row[1] V_fork + row_j
-        if squared(w[a, a]) <= limit:
+        zero = squared(w[a, a]) <= limit
+        if zero:
             flags |= UNDEFINED << a
             flags |= DEAD if empty & (1 << a) else FLOATING
             for i in range(3):  # an opened phase that hangs on this one is as little defined
                 if i != a and mask & (1 << i) and squared(p[i, a]) > SINGULAR**2:
                     flags |= UNDEFINED << i
-            for j in range(3):
-                row[0, j] = row[1, j] = 0.0
-            row_j = 0j
-        else:
-            scale = -reciprocal(w[a, a])
-            row_j = scale * x_j[a]
-            for j in range(3):
-                row[0, j] = scale * w[a, j]
-                row[1, j] = scale * x[a, j]
-            row[0, a] = 0.0
-        for i in range(3):
-            from_w, from_xt, from_p = w[i, a], xt[i, a], p[i, a]
-            for j in range(3):
-                w[i, j] += from_w * row[0, j]
-                x[i, j] += from_w * row[1, j]
-                xt[i, j] += from_xt * row[0, j]
-                u[i, j] += from_xt * row[1, j]
-                p[i, j] += from_p * row[0, j]
-                h[i, j] += from_p * row[1, j]
-            x_j[i] += from_w * row_j
-            u_j[i] += from_xt * row_j
-            h_j[i] += from_p * row_j
-            w[i, a] = xt[i, a] = p[i, a] = 0.0
-        for j in range(3):
-            w[a, j] = x[a, j] = 0.0
-        x_j[a] = 0.0
+        replace_phase(a, zero, work, carried)
     return flags
+
+
+@compiled_apart
+def replace_phase(a: int, zero: bool, work: Work, carried: Flags) -> None:
+    """Put the voltage of an open phase, or zero, in terms of the others."""
+    w, p, x_j, h_j = work.here[0], work.here[1], work.here_j[0], work.here_j[1]
+    here_x, here_h, xt, u, u_j, row = (
+        work.here_x,
+        work.here_h,
+        work.xt,
+        work.u,
+        work.u_j,
+        work.row,
+    )
+    scale = 0j if zero else -reciprocal(w[a, a])
+    own0, own1, own2, own_j = scale * w[a, 0], scale * w[a, 1], scale * w[a, 2], scale * x_j[a]
+    if a == 0:
+        own0 = 0j
+    elif a == 1:
+        own1 = 0j
+    else:
+        own2 = 0j
+    chords = carried.size
+    for c in range(chords):
+        if carried[c]:
+            for j in range(3):
+                row[c, j] = scale * here_x[c, a, j]
+    for i in range(3):
+        from_w, from_p = w[i, a], p[i, a]
+        w[i, 0] += from_w * own0
+        w[i, 1] += from_w * own1
+        w[i, 2] += from_w * own2
+        p[i, 0] += from_p * own0
+        p[i, 1] += from_p * own1
+        p[i, 2] += from_p * own2
+        x_j[i] += from_w * own_j
+        h_j[i] += from_p * own_j
+        w[i, a] = p[i, a] = 0.0
+        for c in range(chords):
+            if carried[c]:
+                from_xt = xt[c, i, a]
+                xt[c, i, 0] += from_xt * own0
+                xt[c, i, 1] += from_xt * own1
+                xt[c, i, 2] += from_xt * own2
+                u_j[c, i] += from_xt * own_j
+                xt[c, i, a] = 0.0
+                for j in range(3):
+                    here_x[c, i, j] += from_w * row[c, j]
+                    here_h[c, i, j] += from_p * row[c, j]
+                    for d in range(chords):
+                        if carried[d]:
+                            u[c, d, i, j] += from_xt * row[d, j]
+    for j in range(3):
+        w[a, j] = 0.0
+        for c in range(chords):
+            if carried[c]:
+                here_x[c, a, j] = 0.0
+    x_j[a] = 0.0
+
+
+@compiled_apart
+def free_modes(tree: Tree, k: int, work: Work, carried: Flags) -> int:
+    """Let loose the modes of edge k at its lower end; returns flags.
+
+    Like ``open_phases``, from any mode. Where the network below does not hold it either, it
+    gets no voltage, and a flag.
+    """
+    w, p, x_j, h_j = work.here[0], work.here[1], work.here_j[0], work.here_j[1]
+    here_x, here_h, xt, u, u_j, row = (
+        work.here_x,
+        work.here_h,
+        work.xt,
+        work.u,
+        work.u_j,
+        work.row,
+    )
+    limit = start(work, carried)
+    chords = carried.size
+    flags = 0
+    for n in range(tree.loose_from[k], tree.loose_from[k + 1]):
+        e = tree.loose[n]
+        from0, from1, from2 = w_times(work, e, 0), w_times(work, e, 1), w_times(work, e, 2)
+        own0, own1, own2 = times_w(work, e, 0), times_w(work, e, 1), times_w(work, e, 2)
+        driving = e[0] * from0 + e[1] * from1 + e[2] * from2
+        if squared(driving) <= limit:
+            flags |= UNEARTHED
+            continue
+        scale = -reciprocal(driving)
+        own0, own1, own2 = scale * own0, scale * own1, scale * own2
+        own_j = scale * (e[0] * x_j[0] + e[1] * x_j[1] + e[2] * x_j[2])
+        for c in range(chords):
+            if carried[c]:
+                for j in range(3):
+                    row[c, j] = scale * (
+                        e[0] * here_x[c, 0, j] + e[1] * here_x[c, 1, j] + e[2] * here_x[c, 2, j]
+                    )
+        for i in range(3):
+            from_w = from0 if i == 0 else (from1 if i == 1 else from2)
+            from_p = p[i, 0] * e[0] + p[i, 1] * e[1] + p[i, 2] * e[2]
+            w[i, 0] += from_w * own0
+            w[i, 1] += from_w * own1
+            w[i, 2] += from_w * own2
+            p[i, 0] += from_p * own0
+            p[i, 1] += from_p * own1
+            p[i, 2] += from_p * own2
+            x_j[i] += from_w * own_j
+            h_j[i] += from_p * own_j
+            for c in range(chords):
+                if carried[c]:
+                    from_xt = xt[c, i, 0] * e[0] + xt[c, i, 1] * e[1] + xt[c, i, 2] * e[2]
+                    xt[c, i, 0] += from_xt * own0
+                    xt[c, i, 1] += from_xt * own1
+                    xt[c, i, 2] += from_xt * own2
+                    u_j[c, i] += from_xt * own_j
+                    for j in range(3):
+                        here_x[c, i, j] += from_w * row[c, j]
+                        here_h[c, i, j] += from_p * row[c, j]
+                        for d in range(chords):
+                            if carried[d]:
+                                u[c, d, i, j] += from_xt * row[d, j]
+    return flags
+
+
+@compiled
+def w_times(work: Work, e: NDArray[np.float64], i: int) -> complex:
+    """``(W e)_i``."""
+    w = work.here[0]
+    return complex(w[i, 0] * e[0] + w[i, 1] * e[1] + w[i, 2] * e[2])
+
+
+@compiled
+def times_w(work: Work, e: NDArray[np.float64], j: int) -> complex:
+    """``(e' W)_j``."""
+    w = work.here[0]
+    return complex(e[0] * w[0, j] + e[1] * w[1, j] + e[2] * w[2, j])
 
 
 @compiled

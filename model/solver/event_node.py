@@ -2,103 +2,151 @@
 
 from __future__ import annotations
 
-from ..compiled import compiled
-from ..states import Work
-from .breaks import DEAD, open_phases
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled, compiled_apart
+from ..states import Tree, Work
+from .breaks import DEAD, free_modes, open_phases
 from .matrix3 import (
-    ZERO,
     Matrix,
     Vector,
     add,
     load,
     load_vector,
     plus,
+    product,
     scaled,
     store,
     store_vector,
+    times,
 )
-from .series import both, carry, carry_current, up
+from .series import carry, carry_current, per_fork, up
 
-__all__ = ["climb_event", "cross", "descend_event"]
+__all__ = ["climb_event", "climb_loose", "cross", "descend_event"]
+
+Flags = NDArray[np.bool_]
+
+
+@compiled_apart
+def climb_series(work: Work, slot: int, z: Matrix, carried: Flags) -> None:
+    """Climb over ``z``: ``here`` has what is below it and receives what is seen from above.
+
+    F and H go to that slot of ``event``.
+    """
+    here, here_j, here_x, event_h = work.here, work.here_j, work.here_x, work.event_h[slot]
+    y = load(here, 0)
+    f, w = up(y, z)
+    h_j, x_j = carry_current(y, z, f, load_vector(here_j, 0), work, carried)
+    for c in range(carried.size):
+        if carried[c]:
+            store(event_h, c, load(here_x, c))
+    carry(y, z, f, event_h, work, carried)
+    for c in range(carried.size):
+        if carried[c]:
+            store(here_x, c, add(load(here_x, c), product(y, load(event_h, c))))
+    store(work.event, slot, f)
+    store_vector(work.event_j, slot, h_j)
+    store(here, 0, w)
+    store_vector(here_j, 0, x_j)
 
 
 @compiled
+def start_at(work: Work, k: int, y: Matrix, x_j: Vector, carried: Flags) -> None:
+    """Begin at the lower end of edge k."""
+    store(work.here, 0, y)
+    store_vector(work.here_j, 0, x_j)
+    for c in range(carried.size):
+        if carried[c]:
+            store(work.here_x, c, load(work.x[k], c))
+
+
+@compiled
+def end_at(work: Work, k: int, carried: Flags) -> None:
+    """What is seen from the upper end of edge k."""
+    store(work.w, k, load(work.here, 0))
+    store_vector(work.x_j, k, load_vector(work.here_j, 0))
+    for c in range(carried.size):
+        if carried[c]:
+            store(work.x[k], c, load(work.here_x, c))
+
+
+@compiled_apart
 def climb_event(
-    work: Work, k: int, y: Matrix, z: Matrix, share: float, mask: int, looped: bool, x_j: Vector
+    work: Work, k: int, y: Matrix, z: Matrix, share: float, mask: int, carried: Flags, x_j: Vector
 ) -> int:
     """Eliminate edge k with the event node on it; returns flags."""
-    here, here_j = work.here, work.here_j
-    z_low = scaled(z, 1.0 - share)
-    f, w = up(y, z_low)
-    h = x = xt = u = ZERO
-    u_j = (0j, 0j, 0j)
-    if looped:
-        xt, u, u_j = load(work.fill, 0), load(work.fill, 1), load_vector(work.fill_j, 0)
-    h_j, x_j, u_j = carry_current(y, z_low, f, x_j, xt, u_j)
-    if looped:
-        h, x, xt, u = carry(y, z_low, f, load(work.x, k), xt, u)
-    store(work.event, 4, f)
-    store(work.event, 5, h)
-    store_vector(work.event_j, 2, h_j)
-    store(here, 0, w)
-    store(here, 1, x)
-    store(here, 2, xt)
-    store(here, 3, u)
-    store_vector(here_j, 0, x_j)
-    store_vector(here_j, 1, u_j)
+    start_at(work, k, y, x_j, carried)
+    climb_series(work, 2, scaled(z, 1.0 - share), carried)
+    x_j = load_vector(work.here_j, 0)
     fed = x_j[0] != 0.0 or x_j[1] != 0.0 or x_j[2] != 0.0
-    flags = cross(work, scaled(z, share), mask, 1)
-    if mask == 7 and not looped and not fed:
+    for c in range(carried.size):
+        fed |= carried[c]
+    flags = cross(work, scaled(z, share), mask, 1, carried)
+    if mask == 7 and not fed:
         flags |= DEAD
-    store(work.w, k, load(here, 0))
-    store_vector(work.x_j, k, load_vector(here_j, 0))
-    if looped:
-        store(work.x, k, load(here, 1))
-        store(work.fill, 0, load(here, 2))
-        store(work.fill, 1, load(here, 3))
-        store_vector(work.fill_j, 0, load_vector(here_j, 1))
+    end_at(work, k, carried)
     return flags
 
 
-@compiled
-def cross(work: Work, z: Matrix, mask: int, below: int) -> int:
+@compiled_apart
+def cross(work: Work, z: Matrix, mask: int, below: int, carried: Flags) -> int:
     """Climb over the event node and the series impedance ``z`` above it; returns flags.
 
     What is below stands in ``work.here``, and what is seen from above ``z`` replaces it.
     ``below`` is the side that is met first: 1 for q, 0 for p.
     """
-    here, here_j, event, event_j = work.here, work.here_j, work.event, work.event_j
+    here = work.here
     store(here, 0, add(load(here, 0), load(work.event_y, below)))
     flags = 0
     if mask:
-        flags = open_phases(mask, here, here_j)
-        store(event, 2, load(here, 4))
-        store(event, 3, load(here, 5))
-        store_vector(event_j, 1, load_vector(here_j, 2))
-    y = add(load(here, 0), load(work.event_y, 1 - below))
-    f, w = up(y, z)
-    xt = load(here, 2)
-    h_j, x_j, u_j = carry_current(y, z, f, load_vector(here_j, 0), xt, load_vector(here_j, 1))
-    h, x, xt, u = carry(y, z, f, load(here, 1), xt, load(here, 3))
-    store(event, 0, f)
-    store(event, 1, h)
-    store_vector(event_j, 0, h_j)
-    store(here, 0, w)
-    store(here, 1, x)
-    store(here, 2, xt)
-    store(here, 3, u)
-    store_vector(here_j, 0, x_j)
-    store_vector(here_j, 1, u_j)
+        flags = open_phases(mask, work, carried)
+        store(work.event, 1, load(here, 1))
+        store_vector(work.event_j, 1, load_vector(work.here_j, 1))
+        for c in range(carried.size):
+            if carried[c]:
+                store(work.event_h[1], c, load(work.here_h, c))
+    store(here, 0, add(load(here, 0), load(work.event_y, 1 - below)))
+    climb_series(work, 0, z, carried)
     return flags
 
 
-@compiled
-def descend_event(work: Work, near: int, above: Vector, v_fork: Vector, mask: int) -> Vector:
+@compiled_apart
+def descend_event(
+    tree: Tree, work: Work, near: int, above: Vector, mask: int, carried: Flags
+) -> Vector:
     """Voltages of both stubs, ``near`` (0 for p) first; returns that of the other."""
-    event, event_j = work.event, work.event_j
-    v = plus(both(load(event, 0), above, load(event, 1), v_fork), load_vector(event_j, 0))
+    event, event_h, event_j, fork, v_all = (
+        work.event,
+        work.event_h,
+        work.event_j,
+        tree.fork,
+        work.v,
+    )
+    v = plus(times(load(event, 0), above), load_vector(event_j, 0))
+    v = per_fork(event_h[0], carried, fork, v_all, v)
     store_vector(work.stub, near, v)
     if mask:
-        v = plus(both(load(event, 2), v, load(event, 3), v_fork), load_vector(event_j, 1))
+        v = plus(times(load(event, 1), v), load_vector(event_j, 1))
+        v = per_fork(event_h[1], carried, fork, v_all, v)
     store_vector(work.stub, 1 - near, v)
     return v
+
+
+@compiled_apart
+def climb_loose(
+    tree: Tree, work: Work, k: int, y: Matrix, z: Matrix, carried: Flags, x_j: Vector
+) -> int:
+    """Eliminate edge k, at whose lower end modes are loose; returns flags."""
+    start_at(work, k, y, x_j, carried)
+    flags = free_modes(tree, k, work, carried)
+    p, p_j = load(work.here, 1), load_vector(work.here_j, 1)
+    climb_series(work, 0, z, carried)
+    end_at(work, k, carried)
+    store(work.f, k, product(p, load(work.event, 0)))
+    store_vector(work.h_j, k, plus(times(p, load_vector(work.event_j, 0)), p_j))
+    for c in range(carried.size):
+        if carried[c]:
+            ahead = product(p, load(work.event_h[0], c))
+            store(work.h[k], c, add(ahead, load(work.here_h, c)))
+    return flags

@@ -15,12 +15,14 @@ from the fork. Past a series impedance
     V = F V_parent + H V_fork,   H = -F Z X,
     W = Y F,   X += Y H,   U += X' H,   X' = X' F.
 
-Machines feed in currents that no voltage drives: they add a last column to X and U, hence to
-H, which stands in vectors of its own (x, u, h below, ``..._j`` in the workspace).
+Loops that share edges carry one X and X' each and a U for every pair.
 
-An event node stands on any edge, a share of Z above it and the rest below. It has two sides,
-the upper stub p and the lower stub q, each with a shunt; open phases between them are the
-projections of ``breaks``.
+Machines feed in currents that no voltage drives: they add a last column to X and U, hence to
+H, which stands in vectors of its own (``..._j`` in the workspace).
+
+A regulator or transformer at an edge's upper end turns the voltages there, what lies below it
+being seen as  T' W T; modes that it leaves loose at the lower end, and open phases between the
+two sides of the event node, are the projections of ``breaks``.
 
 Compiled functions take one scenario of a block and write into its workspace; ``solve`` is
 the door for everybody else.
@@ -31,33 +33,36 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
+from ..compiled import compiled, compiled_apart, compiled_door
 from ..states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from .assemble import set_admittances
 from .breaks import FLOATING, NOTHING_S, SINGULAR, squared
-from .event_node import climb_event, cross, descend_event
+from .event_node import climb_event, climb_loose, cross, descend_event
 from .matrix3 import (
     ZERO,
+    Matrix,
+    Vector,
     add,
     column_sums,
-    inverse,
     load,
     load_vector,
     minus,
     plus,
+    product,
     reciprocal,
     scaled,
     store,
     store_vector,
     times,
 )
-from .series import both, carry, carry_current, up
+from .series import carry, carry_current, per_fork, up
 from .settle import is_linear, positive, update_magnitudes
+from .turns import turn_edge
 
 __all__ = ["solve_block"]
 
 Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @compiled
@@ -66,125 +71,143 @@ def climb(tree: Tree, state: State, work: Work, s: int) -> int:
 
     ``work.y`` holds each node's own admittance and becomes the admittance below it.
     """
-    parents, in_loop, z_all, regulator = tree.parent, tree.in_loop, tree.z_ohm, tree.regulator
-    y_all, y_j, f_all, w_all = work.y, work.y_j, work.f, work.w
-    h_all, x_all, h_j, x_j, fill, fill_j = (
-        work.h,
-        work.x,
-        work.h_j,
-        work.x_j,
-        work.fill,
-        work.fill_j,
-    )
-    edge, share, mask, fork = state.edge[s], state.share[s], state.open_mask[s], tree.fork
-    last = parents.size
+    parents, in_loop, lone, z_all = tree.parent, tree.in_loop, tree.lone_phase, tree.z_ohm
+    y_all, y_j, f_all, w_all, x_j = work.y, work.y_j, work.f, work.w, work.x_j
+    edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
+    last, chords = parents.size, tree.tail.size
     sourced = tree.machine_unit.size > 0
     flags = 0
     for k in range(last - 1, -1, -1):
-        if k == tree.tail:
-            flags |= climb_chord(tree, work, edge == last, share, mask)
-        y, z, looped, drawn = load(y_all, k), load(z_all, k), in_loop[k], load_vector(y_j, k)
+        a, parent = lone[k], parents[k]
+        if a >= 0 and k != edge:
+            y1 = y_all[k, a, a]
+            f1 = reciprocal(1.0 + z_all[k, a, a] * y1)
+            f_all[k, a, a] = f1
+            y1 *= f1
+            w_all[k, a, a] = y1
+            y_all[parent, a, a] += y1
+            continue
+        for c in range(chords):
+            if tree.tail[c] == k:
+                flags |= climb_chord(tree, work, c, edge == last + c, share, mask)
+        y, z, drawn, carried = load(y_all, k), load(z_all, k), load_vector(y_j, k), tree.carried[k]
+        turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
+        if turned and in_loop[k]:
+            for c in range(chords):
+                store(work.x_low[k], c, load(work.x[k], c))
         if k == edge:
-            flags |= climb_event(work, k, y, z, share, mask, looped, drawn)
+            flags |= climb_event(work, k, y, z, share, mask, carried, drawn)
+        elif tree.loose_from[k + 1] > tree.loose_from[k]:
+            flags |= climb_loose(tree, work, k, y, z, carried, drawn)
         else:
             f, w = up(y, z)
             store(f_all, k, f)
             store(w_all, k, w)
             if sourced:
-                xt = load(fill, 0) if looped else ZERO
-                ahead, drawn, back = carry_current(y, z, f, drawn, xt, load_vector(fill_j, 0))
-                store_vector(h_j, k, ahead)
+                ahead, drawn = carry_current(y, z, f, drawn, work, carried)
+                store_vector(work.h_j, k, ahead)
                 store_vector(x_j, k, drawn)
-                if looped:
-                    store_vector(fill_j, 0, back)
-            if looped:
-                # X of the node below in the chain stands in this node's own slot
-                h, x, xt, u = carry(y, z, f, load(x_all, k), load(fill, 0), load(fill, 1))
-                store(h_all, k, h)
-                store(x_all, k, x)
-                store(fill, 0, xt)
-                store(fill, 1, u)
-            if regulator[k] >= 0:
-                regulate(work, k, state.ratio, regulator[k], s, looped)
-        parent = parents[k]
-        if parent < 0:
-            continue
-        total = add(load(y_all, parent), load(w_all, k))
-        if sourced:
-            drawn = plus(load_vector(y_j, parent), load_vector(x_j, k))
-            if looped and parent == fork:
-                drawn = plus(drawn, load_vector(fill_j, 0))
-            store_vector(y_j, parent, drawn)
-        if looped and parent == fork:
-            total = add(add(total, load(x_all, k)), add(load(fill, 0), load(fill, 1)))
-        elif looped:
-            store(x_all, parent, load(x_all, k))
-        store(y_all, parent, total)
+            if in_loop[k]:
+                carry_fill(work, k, y, z, f, carried)
+        if turned:
+            turn_edge(tree, state, work, k, s, carried)
+        if parent >= 0:
+            store(y_all, parent, add(load(y_all, parent), load(w_all, k)))
+            if sourced:
+                store_vector(y_j, parent, plus(load_vector(y_j, parent), load_vector(x_j, k)))
+            if in_loop[k]:
+                hand_up(tree, work, k, parent)
     return flags
 
 
-@compiled
-def regulate(work: Work, k: int, ratio: Real, row: int, s: int, looped: bool) -> None:
-    """Put a regulator at the upper end of edge k, which has been eliminated."""
-    f, w, x, x_j, xt = work.f[k], work.w[k], work.x[k], work.x_j[k], work.fill[0]
-    for j in range(3):
-        t = ratio[row, j, s]
-        for i in range(3):
-            f[i, j] *= t
-            w[i, j] *= t
-            if looped:
-                xt[i, j] *= t
-    for i in range(3):
-        t = ratio[row, i, s]
-        x_j[i] *= t
-        for j in range(3):
-            w[i, j] *= t
-            if looped:
-                x[i, j] *= t
+@compiled_apart
+def carry_fill(work: Work, k: int, y: Matrix, z: Matrix, f: Matrix, carried: Flags) -> None:
+    """The loops' part of eliminating a plain edge."""
+    h, x = work.h[k], work.x[k]
+    for c in range(carried.size):
+        if carried[c]:
+            store(h, c, load(x, c))
+    carry(y, z, f, h, work, carried)
+    for c in range(carried.size):
+        if carried[c]:
+            store(x, c, add(load(x, c), product(y, load(h, c))))
 
 
-@compiled
-def climb_chord(tree: Tree, work: Work, happening: bool, share: float, mask: int) -> int:
-    """Add the chord to the tail's Y and start the fill; returns flags.
+@compiled_apart
+def hand_up(tree: Tree, work: Work, k: int, parent: int) -> None:
+    """Hand the loops' fill to the node above edge k, or add it there where that is a fork."""
+    carried, fork, xt, u, y = tree.carried[k], tree.fork, work.xt, work.u, work.y
+    x, x_above, u_j = work.x[k], work.x[parent], work.u_j
+    chords = carried.size
+    for d in range(chords):
+        if carried[d] and fork[d] != parent:
+            store(x_above, d, load(x, d))
+    for c in range(chords):
+        if not carried[c] or fork[c] != parent:
+            continue
+        store(y, parent, add(load(y, parent), add(load(x, c), load(xt, c))))
+        store_vector(work.y_j, parent, plus(load_vector(work.y_j, parent), load_vector(u_j, c)))
+        for d in range(chords):
+            if not carried[d]:
+                continue
+            if fork[d] == parent:
+                store(y, parent, add(load(y, parent), load(u[c], d)))
+            else:
+                store(x_above, d, add(load(x_above, d), load(u[c], d)))
+                store(xt, d, add(load(xt, d), load(u[d], c)))
+
+
+@compiled_apart
+def climb_chord(tree: Tree, work: Work, c: int, happening: bool, share: float, mask: int) -> int:
+    """Add chord c to its tail's Y and start the fill; returns flags.
 
     An event on it is climbed over from the farther end, so that what is inverted is never
     the small part of the impedance.
     """
-    last = tree.parent.size
-    here = work.here
-    z = load(tree.z_ohm, last)
+    tail, last = tree.tail[c], tree.parent.size
+    w = load(tree.chord_y_s, c)
     flags = 0
-    if happening:
-        far = 1.0 - share if share <= 0.5 else share
-        w = inverse(scaled(z, far))
-    else:
-        w = inverse(z)
+    for d in range(tree.tail.size):
+        store(work.u[c], d, ZERO)
+        store(work.u[d], c, ZERO)
+    store_vector(work.u_j, c, (0j, 0j, 0j))
+    if not happening:
+        away = scaled(w, -1.0)
+        store(work.x[tail], c, away)
+        store(work.xt, c, away)
+        store(work.u[c], c, w)
+        store(work.y, tail, add(load(work.y, tail), w))
+        store(work.chord[0], c, w)
+        store(work.chord[1], c, away)
+        store(work.chord[2], c, away)
+        store(work.chord[3], c, w)
+        return flags
+    z = load(tree.z_ohm, last + c)
+    far = 1.0 - share if share <= 0.5 else share
+    w = scaled(w, 1.0 / far)
     away = scaled(w, -1.0)
-    store(here, 0, w)
-    store(here, 1, away)
-    store(here, 2, away)
-    store(here, 3, w)
+    store(work.here, 0, w)
+    store(work.here_x, c, away)
+    store(work.xt, c, away)
+    store(work.u[c], c, w)
     store_vector(work.here_j, 0, (0j, 0j, 0j))
-    store_vector(work.here_j, 1, (0j, 0j, 0j))
-    if happening:
-        flags = cross(work, scaled(z, 1.0 - far), mask, 1 if share <= 0.5 else 0)
+    flags = cross(work, scaled(z, 1.0 - far), mask, 1 if share <= 0.5 else 0, tree.alone[c])
     # seen from the tail: I = W V + X V_fork, and from the fork: I' = X' V + U V_fork
-    w, x, xt, u = load(here, 0), load(here, 1), load(here, 2), load(here, 3)
-    if happening and share > 0.5:
+    w, x, xt, u = load(work.here, 0), load(work.here_x, c), load(work.xt, c), load(work.u[c], c)
+    if share > 0.5:
         w, x, xt, u = u, xt, x, w
-    store(work.w, last, w)
-    store(work.x, last, x)
-    store(work.chord_end, 0, xt)
-    store(work.chord_end, 1, u)
-    store(work.x, tree.tail, x)
-    store(work.fill, 0, xt)
-    store(work.fill, 1, u)
-    store_vector(work.fill_j, 0, (0j, 0j, 0j))
-    store(work.y, tree.tail, add(load(work.y, tree.tail), w))
+    store(work.chord[0], c, w)
+    store(work.chord[1], c, x)
+    store(work.chord[2], c, xt)
+    store(work.chord[3], c, u)
+    store(work.x[tail], c, x)
+    store(work.xt, c, xt)
+    store(work.u[c], c, u)
+    store(work.y, tail, add(load(work.y, tail), w))
     return flags
 
 
-@compiled
+@compiled_apart
 def lift_neutral(tree: Tree, work: Work) -> int:
     """Shift the EMF (last row of V) by the neutral's voltage; returns flags.
 
@@ -207,79 +230,103 @@ def lift_neutral(tree: Tree, work: Work) -> int:
 
 @compiled
 def descend(tree: Tree, state: State, work: Work, s: int) -> None:
-    """Voltages and currents from the source to the leaves, and the stubs of the event node."""
-    parents, in_loop, regulator, ratio = tree.parent, tree.in_loop, tree.regulator, state.ratio
-    v_all, f_all, h_all, w_all, x_all = work.v, work.f, work.h, work.w, work.x
-    h_j, x_j, i_up, i_low = work.h_j, work.x_j, work.i_up, work.i_low
-    edge, share, mask, fork = state.edge[s], state.share[s], state.open_mask[s], tree.fork
+    """Voltages from the source to the leaves, and the stubs of the event node."""
+    parents, in_loop, lone, phases = tree.parent, tree.in_loop, tree.lone_phase, tree.phases
+    v_all, f_all, fork = work.v, work.f, tree.fork
+    edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
     last = parents.size
     sourced = tree.machine_unit.size > 0
     for k in range(last):
+        a = lone[k]
+        if a >= 0 and k != edge:
+            v_all[k, a] = f_all[k, a, a] * v_all[parents[k], a]
+            continue
         above = load_vector(v_all, parents[k] if k else last)
-        looped = in_loop[k]
-        v_fork = load_vector(v_all, fork) if looped else (0j, 0j, 0j)
-        if looped:
-            current = both(load(w_all, k), above, load(x_all, k), v_fork)
-        else:
-            current = times(load(w_all, k), above)
-        if sourced:
-            current = plus(current, load_vector(x_j, k))
-        store_vector(i_up, k, current)
+        carried = tree.carried[k]
         if k == edge:
-            v = descend_event(work, 0, above, v_fork, mask)
-            v = plus(
-                both(load(work.event, 4), v, load(work.event, 5), v_fork),
-                load_vector(work.event_j, 2),
-            )
-            lost = plus(
-                times(load(work.event_y, 0), load_vector(work.stub, 0)),
-                times(load(work.event_y, 1), load_vector(work.stub, 1)),
-            )
-            current = plus(current, minus(lost))
+            v = descend_event(tree, work, 0, above, mask, carried)
+            v = plus(times(load(work.event, 2), v), load_vector(work.event_j, 2))
+            v = per_fork(work.event_h[2], carried, fork, v_all, v)
         else:
-            if looped:
-                v = both(load(f_all, k), above, load(h_all, k), v_fork)
-            else:
-                v = times(load(f_all, k), above)
+            v = times(load(f_all, k), above)
+            if in_loop[k]:
+                v = per_fork(work.h[k], carried, fork, v_all, v)
             if sourced:
-                v = plus(v, load_vector(h_j, k))
-        store_vector(i_low, k, current)
-        row = regulator[k]
-        if row >= 0:
-            for i in range(3):
-                i_low[k, i] /= ratio[row, i, s]
+                v = plus(v, load_vector(work.h_j, k))
         store_vector(v_all, k, v)
-    if tree.tail >= 0:
-        v_tail, v_fork = load_vector(v_all, tree.tail), load_vector(v_all, fork)
-        into = both(load(work.w, last), v_tail, load(work.x, last), v_fork)
-        back = both(load(work.chord_end, 0), v_tail, load(work.chord_end, 1), v_fork)
-        store_vector(i_up, last, into)
-        store_vector(i_low, last, minus(back))
-        if edge == last and share <= 0.5:
-            descend_event(work, 0, v_tail, v_fork, mask)
-        elif edge == last:
-            descend_event(work, 1, v_fork, v_tail, mask)
-    if tree.charged:
-        add_charging_currents(tree, work, edge, share)
+        if tree.node_phases[k] != 7:
+            keep_phases(v_all, k, tree.node_phases[k])
+    if edge >= last:
+        descend_chord_event(tree, work, edge - last, share, mask)
+    if edge >= 0 and phases[edge] != 7:
+        keep_phases(work.stub, 0, phases[edge])
+        keep_phases(work.stub, 1, phases[edge])
 
 
 @compiled
-def add_charging_currents(tree: Tree, work: Work, edge: int, share: float) -> None:
-    """The currents at an edge's ends include what charges that end of it."""
-    parents, end_y, v, i_up, i_low = tree.parent, tree.end_y_s, work.v, work.i_up, work.i_low
+def keep_phases(v: Complex, k: int, phases: int) -> None:
+    """Zero in row k for phases that are not there."""
+    for i in range(3):
+        if not phases & (1 << i):
+            v[k, i] = 0.0
+
+
+@compiled_apart
+def descend_chord_event(tree: Tree, work: Work, c: int, share: float, mask: int) -> None:
+    """The stubs of an event on a chord, which was climbed from its nearer end's other side."""
+    tail, fork = tree.tail[c], tree.fork[c]
+    near, far, side = (tail, fork, 0) if share <= 0.5 else (fork, tail, 1)
+    v_far = load_vector(work.v, far)
+    v = plus(times(load(work.event, 0), load_vector(work.v, near)), load_vector(work.event_j, 0))
+    v = plus(v, times(load(work.event_h[0], c), v_far))
+    store_vector(work.stub, side, v)
+    if mask:
+        v = plus(times(load(work.event, 1), v), load_vector(work.event_j, 1))
+        v = plus(v, times(load(work.event_h[1], c), v_far))
+    store_vector(work.stub, 1 - side, v)
+
+
+@compiled_apart
+def edge_current(tree: Tree, state: State, work: Work, s: int, k: int, below: bool) -> Vector:
+    """Current from above into edge k, or ``below``: out of its lower end."""
+    parents, v_all, edge, share = tree.parent, work.v, state.edge[s], state.share[s]
     last = parents.size
-    for k in range(1, last + (1 if tree.tail >= 0 else 0)):
-        half = load(end_y, k)
-        upper, lower = (tree.tail, tree.fork) if k == last else (parents[k], k)
-        first = times(half, load_vector(v, upper))
-        second = times(half, load_vector(v, lower))
-        above, below = (share, 1.0 - share) if k == edge else (1.0, 1.0)
-        for i in range(3):
-            i_up[k, i] += above * first[i]
-            i_low[k, i] -= below * second[i]
+    if k >= last:
+        c = k - last
+        upper, lower = tree.tail[c], tree.fork[c]
+        v, v_fork = load_vector(v_all, upper), load_vector(v_all, lower)
+        side = 2 if below else 0
+        current = plus(
+            times(load(work.chord[side], c), v), times(load(work.chord[side + 1], c), v_fork)
+        )
+        if below:
+            current = minus(current)
+    else:
+        upper, lower = parents[k] if k else last, k
+        carried = tree.carried[k]
+        if below and (tree.regulator[k] >= 0 or tree.transformer[k] >= 0):
+            current = plus(times(load(work.y, k), load_vector(v_all, k)), load_vector(work.y_j, k))
+            current = per_fork(work.x_low[k], carried, tree.fork, v_all, current)
+        else:
+            current = times(load(work.w, k), load_vector(v_all, upper))
+            current = plus(current, load_vector(work.x_j, k))
+            current = per_fork(work.x[k], carried, tree.fork, v_all, current)
+            if k == edge and below:
+                for n in range(2):
+                    lost = times(load(work.event_y, n), load_vector(work.stub, n))
+                    current = plus(current, minus(lost))
+    if tree.charged and k:
+        part = 1.0
+        if k == edge:
+            part = 1.0 - share if below else share
+        charging = times(
+            scaled(load(tree.end_y_s, k), part), load_vector(v_all, lower if below else upper)
+        )
+        current = plus(current, minus(charging) if below else charging)
+    return current
 
 
-@compiled
+@compiled_door
 def solve_block(
     tree: Tree,
     state: State,
@@ -292,36 +339,34 @@ def solve_block(
 ) -> None:
     """Solve S scenarios one after the other into ``answer``.
 
-    ``answer.unit_v_pu`` is the start of the fixed point and its end. Loads are constant
+    ``answer.winding_v_pu`` is the start of the fixed point and its end. Loads are constant
     impedance below ``floor_pu``. What does not settle within ``most_passes`` is flagged.
     """
     last = tree.parent.size
     v_node, i_edge, i_below = probes.v_node, probes.i_edge, probes.i_below
-    v_out, i_out, stub_out, unit_out = answer.v, answer.i, answer.stub, answer.unit_v_pu
-    v, stub, i_up, i_low = work.v, work.stub, work.i_up, work.i_low
-    unit_v_pu, history = work.unit_v_pu, work.history
+    v_out, i_out, stub_out, winding_out = answer.v, answer.i, answer.stub, answer.winding_v_pu
+    v, stub, winding_v_pu, history = work.v, work.stub, work.winding_v_pu, work.history
     turn = np.exp(-2j * np.pi / 3)
     for s in range(state.emf_pu.size):
         linear = is_linear(tree, state, s)
-        emf = complex(state.emf_pu[s] * tree.v_nominal_v, 0.0)
+        emf = state.emf_pu[s] * tree.v_nominal_v * tree.emf_turn
         store_vector(stub, 0, (0j, 0j, 0j))
         store_vector(stub, 1, (0j, 0j, 0j))
-        for unit in range(unit_v_pu.shape[0]):
-            for i in range(4):
-                unit_v_pu[unit, i] = unit_out[unit, i, s]
-                history[0, unit, i] = history[1, unit, i] = 0.0
+        for n in range(winding_v_pu.size):
+            winding_v_pu[n] = winding_out[n, s]
+            history[0, n] = history[1, n] = 0.0
         settled = False
         flags = 0
         passes = 0
         while not settled and passes < most_passes:
             passes += 1
-            set_admittances(tree, state, work, s, unit_v_pu, floor_pu)
+            set_admittances(tree, state, work, s, floor_pu)
             flags = climb(tree, state, work, s)
             store_vector(v, last, (emf, emf * turn, emf * turn.conjugate()))
             if tree.lifted:
                 flags |= lift_neutral(tree, work)
             descend(tree, state, work, s)
-            change = update_magnitudes(tree, work, unit_v_pu, history, passes)
+            change = update_magnitudes(tree, state, work, s, passes)
             settled = linear or change <= tolerance_pu
         answer.flags[s] = flags if settled else flags | NOT_CONVERGED
         answer.passes[s] = passes
@@ -329,14 +374,14 @@ def solve_block(
             unit = tree.machine_unit[m]
             windings = times(load(work.g, unit), load_vector(v, tree.unit_node[unit]))
             answer.machine_v1_v[m, s] = positive(plus(windings, load_vector(work.g_j, unit)))
-        for unit in range(unit_v_pu.shape[0]):
-            for i in range(4):
-                unit_out[unit, i, s] = unit_v_pu[unit, i]
+        for n in range(winding_v_pu.size):
+            winding_out[n, s] = winding_v_pu[n]
+        for n in range(i_edge.size):
+            current = edge_current(tree, state, work, s, i_edge[n], i_below[n])
+            for i in range(3):
+                i_out[n, i, s] = current[i]
         for i in range(3):
             stub_out[0, i, s] = stub[0, i]
             stub_out[1, i, s] = stub[1, i]
             for n in range(v_node.size):
                 v_out[n, i, s] = v[v_node[n], i]
-            for n in range(i_edge.size):
-                k = i_edge[n]
-                i_out[n, i, s] = i_low[k, i] if i_below[n] else i_up[k, i]

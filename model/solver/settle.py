@@ -19,48 +19,88 @@ SHORT_STEP = 0.35
 
 
 @compiled
-def update_magnitudes(tree: Tree, work: Work, unit_v_pu: Real, history: Real, passes: int) -> float:
+def update_magnitudes(tree: Tree, state: State, work: Work, s: int, passes: int) -> float:
     """Move winding and step voltages towards the solved ones; returns the largest gap.
 
     The gap is in pu, of the largest voltage where that exceeds nominal. From the second pass
     on the step follows the secant through this pass and the last (Anderson's mixing of depth
     one), which also ends cycles and creeping near collapse; what wanders all the same settles
-    in plain steps. ``history`` (3, U + 1, 4): the last pass's voltages and gaps, and this
-    pass's gaps.
+    in plain steps.
     """
-    unit_node, g, g_j, v_all, stub = tree.unit_node, work.g, work.g_j, work.v, work.stub
-    units = unit_node.size
-    sourced = tree.machine_unit.size > 0
-    last = 4 if sourced else 3
+    v_pu, history = work.winding_v_pu, work.history
+    largest = max(1.0, find_gaps(tree, state, work, s))
     change = along = across = 0.0
-    largest = 1.0
-    for unit in range(units + 1):
-        if unit < units:
-            v = times(load(g, unit), load_vector(v_all, unit_node[unit]))
-            if sourced:
-                v = plus(v, load_vector(g_j, unit))
-        else:
-            v = load_vector(stub, 0)
-        for i in range(last):
-            value = v[i] if i < 3 else positive(v)
-            size = np.sqrt(value.real**2 + value.imag**2) / tree.v_nominal_v
-            gap = size - unit_v_pu[unit, i]
-            turn = gap - history[1, unit, i]
-            change, largest = max(change, abs(gap)), max(largest, size)
-            along += gap * turn
-            across += turn * turn
-            history[2, unit, i] = gap
+    for n in range(v_pu.size):
+        gap = history[2, n]
+        turn = gap - history[1, n]
+        change = max(change, abs(gap))
+        along += gap * turn
+        across += turn * turn
     plain = passes == 1 or passes > SECANT_PASSES or across == 0.0
     back = 0.0 if plain else along / across
     step = SHORT_STEP if passes > PLAIN_PASSES else 1.0
-    for unit in range(units + 1):
-        for i in range(last):
-            v_pu, gap = unit_v_pu[unit, i], history[2, unit, i]
-            moved = v_pu - history[0, unit, i] + gap - history[1, unit, i]
-            unit_v_pu[unit, i] = max(v_pu + step * gap - back * moved, 0.0)
-            history[0, unit, i] = v_pu
-            history[1, unit, i] = gap
+    for n in range(v_pu.size):
+        value, gap = v_pu[n], history[2, n]
+        moved = value - history[0, n] + gap - history[1, n]
+        v_pu[n] = max(value + step * gap - back * moved, 0.0)
+        history[0, n] = value
+        history[1, n] = gap
     return change / largest
+
+
+@compiled
+def find_gaps(tree: Tree, state: State, work: Work, s: int) -> float:
+    """How far the solved voltages are from those assumed; returns the largest voltage, in pu."""
+    unit_node, unit_v, v_all, v_pu, gaps = (
+        tree.unit_node,
+        tree.unit_v,
+        work.v,
+        work.winding_v_pu,
+        work.history[2],
+    )
+    units = unit_node.size
+    sourced = tree.machine_unit.size > 0
+    last = 4 if sourced else 3
+    largest = 0.0
+    for unit in range(units):
+        v = times(load(work.g, unit), load_vector(v_all, unit_node[unit]))
+        if sourced:
+            v = plus(v, load_vector(work.g_j, unit))
+        for i in range(last):
+            size = magnitude(v[i] if i < 3 else positive(v)) / unit_v[unit]
+            gaps[4 * unit + i] = size - v_pu[4 * unit + i]
+            largest = max(largest, size)
+    edge = state.edge[s]
+    if edge >= 0:
+        count = tree.parent.size
+        nominal = tree.node_v[edge if edge < count else tree.tail[edge - count]]
+        for i in range(3):
+            size = magnitude(work.stub[0, i]) / nominal
+            gaps[4 * units + i] = size - v_pu[4 * units + i]
+            largest = max(largest, size)
+    else:
+        gaps[4 * units : 4 * units + 3] = 0.0
+    node, first, other, nominal_v = (
+        tree.branch_node,
+        tree.branch_from,
+        tree.branch_to,
+        tree.branch_v,
+    )
+    at = 4 * (units + 1)
+    for p in range(node.size):
+        across = v_all[node[p], first[p]]
+        if other[p] >= 0:
+            across -= v_all[node[p], other[p]]
+        size = magnitude(across) / nominal_v[p]
+        gaps[at + p] = size - v_pu[at + p]
+        largest = max(largest, size)
+    return largest
+
+
+@compiled
+def magnitude(value: complex) -> float:
+    """``|value|``."""
+    return float(np.sqrt(value.real * value.real + value.imag * value.imag))
 
 
 @compiled
@@ -74,9 +114,10 @@ def positive(v: Vector) -> complex:
 def is_linear(tree: Tree, state: State, s: int) -> bool:
     """Whether nothing in scenario ``s`` depends on the magnitude of a voltage."""
     exponent, follows, machine_va = state.exponent, state.machine_exponent, state.machine_va
+    law_linear = tree.law_linear
     linear = bool(state.edge[s] < 0 or state.step_exponent[s] == 2.0)
     for n in range(exponent.shape[0]):
-        linear &= exponent[n, s] == 2.0
+        linear &= exponent[n, s] == 2.0 or (exponent[n, s] < 0.0 and law_linear[n])
     for m in range(follows.shape[0]):
         linear &= follows[m, s] == 2.0 or machine_va[m, s] == 0.0
     return linear

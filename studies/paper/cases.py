@@ -18,6 +18,7 @@ from ...detector.evidence import Phasors, evidence_of
 from ...detector.impedance import connection_impedance
 from ...detector.superimpose import superimposed
 from ...model.errors import OpenPhaseError
+from ...model.line_matrices import z1_ohm
 from ...model.machine_state import carried_over
 from ...model.network import compile_network, locate
 from ...model.parts import Der, DerModel, Feeder, Line
@@ -83,7 +84,9 @@ def unit_at(feeder: Feeder, name: str, at: float) -> Feeder:
 
 def z0_factor(feeder: Feeder, factor: float) -> Feeder:
     """Lines whose zero-sequence impedance is ``factor`` times their positive one."""
-    lines = tuple(replace(x, z0_ohm_per_km=factor * x.z1_ohm_per_km) for x in feeder.lines)
+    lines = tuple(
+        replace(x, z0_ohm_per_km=factor * z1_ohm(feeder, x) / x.length_km) for x in feeder.lines
+    )
     return replace(feeder, lines=lines)
 
 
@@ -91,6 +94,8 @@ def line_ohm(feeder: Feeder, name: str, ohm: float) -> Feeder:
     """One line with another total |Z1|, at its own angle, and Z0 in proportion."""
 
     def scaled(line: Line) -> Line:
+        assert line.z1_ohm_per_km is not None
+        assert line.z0_ohm_per_km is not None
         factor = ohm / (abs(line.z1_ohm_per_km) * line.length_km)
         return replace(
             line,
@@ -182,7 +187,7 @@ def open_phase_a(
     whole = solve(network, before, probes)
     after = before._replace(open_mask=np.array([PHASE_A]))
     after = carried_over(network, before, whole, after, np.ones((len(feeder.ders), 1)))
-    broken = solve(network, after, probes, start=whole.unit_v_pu)
+    broken = solve(network, after, probes, start=whole.winding_v_pu)
     if (whole.flags[0] | broken.flags[0]) & NOT_CONVERGED:
         raise OpenPhaseError(f"{feeder.name}: loads or generation did not settle")
     into = into_line(points)[:, None, None]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...model.closed_form import z_op1_loop_approx
+from ...model.line_matrices import z1_ohm
 from ...model.parts import DerModel, Feeder
 from .cases import PV_KW, line_ohm, open_phase_a, pv_impedance, with_pv
 from .printed import PRINTED, Group, Row
@@ -26,7 +27,7 @@ def two_source_groups(feeder: Feeder) -> Iterator[Group]:
 
 def _figure_14(feeder: Feeder) -> Group:
     case = open_phase_a(feeder, tie_closed=True)
-    ohm = {line.name: line.z1_ohm_per_km * line.length_km for line in feeder.lines}
+    ohm = {line.name: z1_ohm(feeder, line) for line in feeder.lines}
     total = np.array(sum(ohm.values(), start=0j))
     rest = float(np.abs(z_op1_loop_approx(total, np.array(ohm["R2-R3"]))))
     parts = " + ".join(f"{abs(z):g}" for name, z in ohm.items() if name != "R2-R3")

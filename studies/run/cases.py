@@ -20,6 +20,7 @@ from ..spec.parts import UNKNOWN_CONNECTION
 from ..spec.parts import Group as GroupSpec
 from ..spec.study_file import Study
 from .classes import DrawClass
+from .load_levels import load_places
 
 __all__ = ["Case", "Group", "Sites", "Wired", "make_case", "make_cases"]
 
@@ -72,6 +73,7 @@ class Case:
     unknown_units: NDArray[np.int64]  #: units whose connection is drawn
     unknown_choices: Choices
     unknown_connections: NDArray[np.int64]  #: (choices,) their codes in the solver
+    load_places: NDArray[np.int64]  #: (L,) which measured place sees each load, -1 for none
     judged: NDArray[np.bool_]  #: (T,) terminals whose settings are live in this group
     drawn: tuple[DrawClass, ...]  #: classes that the study asks for and the feeder can have
     grid: Grid  #: the settings that the device can hold
@@ -138,6 +140,7 @@ def _case(
         unknown_units=np.array(unknown, np.int64),
         unknown_choices=choices,
         unknown_connections=np.array([CONNECTIONS[name] for name in choices.values], np.int64),
+        load_places=load_places(feeder, study),
         judged=judged,
         drawn=_drawn(feeder, study, bool(ties), bool(transfers)),
         grid=_grid(study),

@@ -127,6 +127,6 @@ def _into(wired: Wired, answer: Answer) -> NDArray[np.complex128]:
 
 def _guess(network: Network, state: State) -> NDArray[np.float64]:
     """Winding voltages near the solution: the drop at nominal load, scaled by the mean load."""
-    drop = 1.0 - solve(network, steady_state(network)).unit_v_pu
+    drop = 1.0 - solve(network, steady_state(network)).winding_v_pu
     mean = state.load_scale.sum(axis=0) / max(len(network.loads), 1)
     return np.asarray(1.0 - drop * mean)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from ...model.errors import InputError, KeyPath, Report
+from ...model.load_regions import load_regions, measurable
 from ...model.parts import Feeder
 from ...model.reading.fields import as_toml, did_you_mean
 from .correlations import SCALARS, contradicting, scalar_of
@@ -46,6 +47,7 @@ def try_grid(grid: Callable[[], object], path: KeyPath, found: str, report: Repo
 def check_together(study: Study, report: Report) -> None:
     """Check the values of a study against each other; what is faulty already is left alone."""
     _check_counts(study, report)
+    _check_measured(study, report)
     _check_groups(study, report)
     _check_correlations(study, report)
     _check_device(study, report)
@@ -66,6 +68,15 @@ def _check_counts(study: Study, report: Report) -> None:
         path = ("transformers", "yg_d_count")
         rule = f"must not exceed the {len(draw.yg_d)} units named by yg_d"
         report.add(path, rule, _written(path, report))
+
+
+def _check_measured(study: Study, report: Report) -> None:
+    """Every place is measured once."""
+    names = [item.point for item in study.measured]
+    for index, name in enumerate(names):
+        path: KeyPath = ("measured", index, "point")
+        if name in names[:index] and not is_faulty(path, report):
+            report.add(path, "must be measured once", repr(name))
 
 
 def _check_groups(study: Study, report: Report) -> None:
@@ -128,6 +139,7 @@ def check_against_feeder(study: Study, feeder: Feeder, report: Report) -> None:
     """Check that what the study names is in the feeder, and can be what the study makes of it."""
     _check_transformers(study, feeder, report)
     _check_ders(study, feeder, report)
+    _check_places(study, feeder, report)
     switches = [switch.name for switch in feeder.switches]
     points = [point.name for point in feeder.points]
     _check_names(study.network.closed or (), switches, "switch", ("network", "closed"), report)
@@ -142,6 +154,24 @@ def check_against_feeder(study: Study, feeder: Feeder, report: Report) -> None:
     for path, closed, opened in states:
         _check_names(closed, switches, "switch", (*path, "closed"), report)
         _check_names(opened, points, "measuring point", (*path, "opened"), report)
+
+
+def _check_places(study: Study, feeder: Feeder, report: Report) -> None:
+    """Every measured place is one of the feeder's, and sees loads that no other sees."""
+    known = measurable(feeder)
+    for index, item in enumerate(study.measured):
+        if item.point not in known:
+            rule = (
+                "must be a measuring point of the feeder, or its source's bus"
+                f"{did_you_mean(item.point, known)}"
+            )
+            report.add(("measured", index, "point"), rule, repr(item.point))
+    names = [item.point for item in study.measured]
+    if not set(names) <= set(known):
+        return
+    for name in load_regions(feeder, names).in_loop:
+        path = ("measured", names.index(name), "point")
+        report.add(path, "must not lie in a closed loop: it does not see all of its load", name)
 
 
 def _check_names(

@@ -50,10 +50,12 @@ def draw_scalars(
 
     Those that the feeder file decides are left out. The same random numbers are taken
     whatever the study says, so that studies differ only in what they draw differently.
-    ``ambient.source_pct`` is the change itself, up or down.
+    ``ambient.source_pct`` is the change itself, up or down. What was measured somewhere is
+    there as ``measured.`` and the place: it takes the same random number as ``loads.level``.
     """
     uniforms = joint_uniforms(rng, size, _matrix(study.correlations))
-    drawn = {}
+    common = uniforms[SCALARS.index("loads.level")]
+    drawn = {f"measured.{item.point}": item.level.quantile(common) for item in study.measured}
     for name, u in zip(SCALARS, uniforms, strict=True):
         distribution = scalar_of(study, name)
         if distribution is not None:

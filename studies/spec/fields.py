@@ -23,6 +23,7 @@ __all__ = [
     "EVENTS",
     "FORMAT",
     "GROUPS",
+    "MEASURED",
     "STATES",
     "STEPS",
     "TABLES",
@@ -65,6 +66,7 @@ DOCUMENT: tuple[Field, ...] = (
         doc="Version of this format.",
     ),
     _optional("loads", "How much the loads take."),
+    Field(name="measured", kind="tables", default=[], doc="How much where it was measured."),
     _optional("motors", "How much of it motors take."),
     _optional("transformers", "How the transformers are connected."),
     _optional("ders", "What DER deliver."),
@@ -95,6 +97,24 @@ CORRELATIONS: tuple[Field, ...] = (
         high=1.0,
         required=True,
         doc="Their rank correlation (Spearman).",
+    ),
+)
+
+MEASURED: tuple[Field, ...] = (
+    Field(
+        name="point",
+        kind="name",
+        required=True,
+        doc="Measuring point, or the source's bus; its loads are those beyond it that no further"
+        " measured one sees.",
+    ),
+    Field(
+        name="level",
+        kind="distribution",
+        low=0.0,
+        high=100.0,
+        required=True,
+        doc="Factor on these loads together, in place of `level` of `[loads]`.",
     ),
 )
 

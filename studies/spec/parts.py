@@ -24,6 +24,7 @@ __all__ = [
     "Group",
     "Instruments",
     "LoadDraw",
+    "MeasuredLoad",
     "MotorDraw",
     "NetworkState",
     "ReferenceSettings",
@@ -65,6 +66,24 @@ class LoadDraw:
     each: Distribution = Uniform(low=0.8, high=1.2)
     exponent: Distribution | Literal["file"] = Uniform(low=0.0, high=2.0)
     exponent_spread: float = 0.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredLoad:
+    """How much the loads take that a measured place sees, in place of the common level.
+
+    Parameters
+    ----------
+    point
+        A measuring point, or the source's bus for all of the feeder. Its loads are those beyond
+        it that no further measured place sees.
+    level
+        Factor common to these loads, on the feeder file's kW. It is high and low together with
+        the common level.
+    """
+
+    point: str
+    level: Distribution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -322,6 +341,7 @@ class Study:
     """
 
     loads: LoadDraw = LoadDraw()
+    measured: tuple[MeasuredLoad, ...] = ()
     motors: MotorDraw = MotorDraw()
     transformers: TransformerDraw = TransformerDraw()
     ders: DerDraw = DerDraw()

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ...model.distributions import Fixed
 from ...model.errors import KeyPath, Report
 from ...model.reading.fields import Field, as_toml, describe_field
 from ...model.reading.table_check import check_table
@@ -13,8 +14,18 @@ from .checks import check_together, try_grid
 from .device import Steps
 from .event_fields import EVENT_TABLES
 from .events import CLASSES, Events, SwitchState
-from .fields import CORRELATIONS, DOCUMENT, EVENTS, GROUPS, STATES, STEPS, TABLES, part_of
-from .parts import Correlation, Group, Study
+from .fields import (
+    CORRELATIONS,
+    DOCUMENT,
+    EVENTS,
+    GROUPS,
+    MEASURED,
+    STATES,
+    STEPS,
+    TABLES,
+    part_of,
+)
+from .parts import Correlation, Group, MeasuredLoad, Study
 from .values import READERS, Reader
 
 __all__ = ["study_of"]
@@ -41,6 +52,10 @@ def study_of(report: Report) -> Study:
     without = events.get("without", ())
     study = Study(
         **parts,
+        measured=tuple(
+            MeasuredLoad(**(_NOT_MEASURED | _given(row, MEASURED, ("measured", index), report)))
+            for index, row in enumerate(top["measured"])
+        ),
         events=Events(without=without, **event_parts),
         groups=tuple(
             Group(**({"name": ""} | _given(row, GROUPS, ("groups", index), report)))
@@ -57,6 +72,7 @@ def study_of(report: Report) -> Study:
     return study
 
 
+_NOT_MEASURED: dict[str, Any] = {"point": "", "level": Fixed(value=1.0)}
 _NO_CORRELATION: dict[str, Any] = {"between": ("", ""), "rank": 0.0}
 
 

@@ -39,6 +39,7 @@ from .parts import (
     Group,
     Instruments,
     LoadDraw,
+    MeasuredLoad,
     MotorDraw,
     NetworkState,
     ReferenceSettings,
@@ -60,6 +61,7 @@ __all__ = [
     "Instruments",
     "LoadDraw",
     "LoadStepDraw",
+    "MeasuredLoad",
     "MotorDraw",
     "NetworkState",
     "OpenPhaseDraw",
@@ -76,6 +78,7 @@ __all__ = [
     "dump_study",
     "read_study",
     "resolved",
+    "study_beside",
     "study_from_toml",
 ]
 
@@ -113,7 +116,15 @@ def study_from_toml(text: str, source_name: str) -> Study:
 
 
 def default_study(feeder_name: str) -> Study:
-    """Return the study that ships with a shipped feeder; for any other, all the defaults.
+    """Return the study that ships with a shipped feeder, or stands beside a feeder's file.
+
+    Beside ``NAME.toml``, whatever its ending, that is ``NAME.study.toml``. Without either, all
+    the defaults.
+
+    Raises
+    ------
+    InputError
+        With every fault of that study.
 
     Examples
     --------
@@ -122,10 +133,24 @@ def default_study(feeder_name: str) -> Study:
     >>> default_study("my feeder") == Study()
     True
     """
+    if feeder_name not in shipped_feeders():
+        beside = study_beside(Path(feeder_name))
+        return read_study(beside) if beside.is_file() else Study()
     file = _DATA / f"{feeder_name}.study.toml"
-    if feeder_name not in shipped_feeders() or not file.is_file():
+    if not file.is_file():
         return Study()
     return study_from_toml(file.read_text(encoding="utf-8"), file.name)
+
+
+def study_beside(feeder_file: Path) -> Path:
+    """Return where the study of a feeder file stands, if it has one.
+
+    Examples
+    --------
+    >>> study_beside(Path("east.toml")).name
+    'east.study.toml'
+    """
+    return feeder_file.with_name(f"{feeder_file.stem}.study.toml")
 
 
 def check_study(
@@ -245,6 +270,7 @@ def _dump(study: Study, without: Mapping[str, Collection[str] | None]) -> str:
         if left_out is not None:
             row = {key: value for key, value in _row(study, table).items() if key not in left_out}
             blocks.append(f"[{table}]\n{toml_rows(row)}")
+    blocks += [f"[[measured]]\n{toml_rows(as_table(item))}" for item in study.measured]
     blocks += [f"[[groups]]\n{toml_rows(as_table(group))}" for group in study.groups]
     blocks += [f"[[correlations]]\n{toml_rows(as_table(item))}" for item in study.correlations]
     return "\n".join(blocks)
@@ -264,6 +290,7 @@ def _document(study: Study) -> dict[str, object]:
         "format": FORMAT,
         **rows,
         "events": events,
+        "measured": [as_table(item) for item in study.measured],
         "groups": [as_table(group) for group in study.groups],
         "correlations": [as_table(item) for item in study.correlations],
     }

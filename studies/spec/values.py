@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ...model.distributions import (
     Choices,
     Distribution,
@@ -16,6 +18,7 @@ from ...model.distributions import (
     Integers,
     Lognormal,
     Normal,
+    Quantiles,
     Triangular,
     Uniform,
     Values,
@@ -80,7 +83,7 @@ def _plain_value(value: object, field: Field, path: KeyPath, report: Report) -> 
 
 def _read_shape(value: Mapping[str, object], path: KeyPath, report: Report) -> Distribution:
     """Return the distribution of a table such as ``{ normal = [..], within = [..] }``."""
-    known = (*_SHAPES, "values")
+    known = (*_SHAPES, "quantiles", "values")
     shapes = [key for key in known if key in value]
     if len(shapes) != 1:
         report.add(path, f"must have just one of the keys {', '.join(known)}", as_toml(value))
@@ -88,6 +91,8 @@ def _read_shape(value: Mapping[str, object], path: KeyPath, report: Report) -> D
     (shape,) = shapes
     if shape == "values":
         return Values(**check_table(value, _VALUES, path, report))
+    if shape == "quantiles":
+        return _read_quantiles(value, path, report)
     kind, keys = _SHAPES[shape]
     faults = len(report.faults)
     number: Kind = "integers" if shape == "integers" else "numbers"
@@ -104,6 +109,14 @@ def _read_shape(value: Mapping[str, object], path: KeyPath, report: Report) -> D
         named |= zip(names, given[key], strict=False)
     return kind(**named) if len(report.faults) == faults else _STAND_IN
 
+
+def _read_quantiles(value: Mapping[str, object], path: KeyPath, report: Report) -> Distribution:
+    faults = len(report.faults)
+    found = Quantiles(values=check_table(value, _QUANTILES, path, report)["quantiles"])
+    return found if len(report.faults) == faults and found.values else _STAND_IN
+
+
+_QUANTILES = (Field(name="quantiles", kind="numbers", required=True, doc=""),)
 
 _VALUES = (
     Field(name="values", kind="numbers", required=True, doc=""),
@@ -197,19 +210,25 @@ def as_table(part: object) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
+    if isinstance(value, (Distribution, Choices)):
+        return _plain_distribution(value)
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return as_table(value) if is_dataclass(value) else value
+
+
+def _plain_distribution(value: Distribution | Choices) -> object:
     if isinstance(value, Fixed):
         return float(value.value)
     if isinstance(value, Uniform):
         return [float(value.low), float(value.high)]
+    if isinstance(value, Quantiles):
+        return {"quantiles": list(value.values)}
     if isinstance(value, (Values, Choices)):
         row = {"values": list(value.values), "weights": list(value.weights)}
         return row if value.weights else {"values": row["values"]}
-    if isinstance(value, Distribution):
-        (keys,) = (keys for kind, keys in _SHAPES.values() if kind is type(value))
-        return {key: [getattr(value, name) for name in names] for key, names in keys.items()}
-    if isinstance(value, tuple):
-        return [_plain(item) for item in value]
-    return as_table(value) if is_dataclass(value) else value
+    (keys,) = (keys for kind, keys in _SHAPES.values() if kind is type(value))
+    return {key: [getattr(value, name) for name in names] for key, names in keys.items()}
 
 
 # ---- telling ----
@@ -241,4 +260,6 @@ def distribution_text(drawn: Distribution | Choices) -> str:
         return f"lognormal, median {drawn.median:g}, σ {drawn.sigma:g}, from {low} to {high}"
     if isinstance(drawn, Triangular):
         return f"{low} to {high}, likeliest {drawn.mode:g}"
+    if isinstance(drawn, Quantiles):
+        return f"as measured, {low} to {high}, median {float(drawn.quantile(np.array(0.5))):g}"
     return low if low == high else f"{low} to {high}"

@@ -89,7 +89,7 @@ def test_a_feeder_solved_by_general_banks_alone_is_the_same(seed: int) -> None:
     v = network.tree.v_nominal_v
     assert one.flags.tolist() == other.flags.tolist()
     np.testing.assert_allclose(one.v / v, other.v / v, atol=1e-10)
-    np.testing.assert_allclose(one.unit_v_pu[:-1], other.unit_v_pu[:-1], atol=1e-10)
+    np.testing.assert_allclose(one.winding_v_pu[:-1], other.winding_v_pu[:-1], atol=1e-10)
 
 
 def test_the_sample_has_plain_banks_of_every_form() -> None:

@@ -18,6 +18,7 @@ from openphase.model.distributions import (
     Integers,
     Lognormal,
     Normal,
+    Quantiles,
     Triangular,
     Uniform,
     Values,
@@ -38,6 +39,8 @@ DISCRETE = [
     Fixed(value=3.5),
     Integers(least=-2, most=3),
     Integers(least=4, most=4),
+    Quantiles(values=(-1.0, 0.0, 0.0, 3.0, 4.0)),
+    Quantiles(values=(0.2, 1.0)),
     Values(values=(1.0, 2.5, 7.0)),
     Values(values=(1.0, 2.5, 7.0, 9.0), weights=(2.0, 0.0, 1.0, 5.0)),
 ]

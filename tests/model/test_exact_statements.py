@@ -106,8 +106,7 @@ def between(at: Scene, terminal: Terminal) -> np.ndarray:
 
 def inside_linear(at: Scene, terminal: Terminal, state: State) -> State:
     """``state`` with every load in the section constant impedance; all else is free."""
-    tree = at.network.tree
-    inside = between(at, terminal)[tree.unit_node][tree.load_unit]
+    inside = between(at, terminal)[at.network.load_node]
     return state._replace(exponent=np.where(inside[:, None], 2.0, state.exponent))
 
 
@@ -210,8 +209,7 @@ def test_z_op1_is_minus_a_v_n_over_i_q() -> None:
         for t, m in source_side(at):
             line, fraction = a_place(at, t, rng)
             state = at.states(size)
-            tree = at.network.tree
-            own = below(at, m)[tree.unit_node][tree.load_unit]
+            own = below(at, m)[at.network.load_node]
             state = state._replace(exponent=np.where(own[:, None], 2.0, state.exponent))
             first = looks(at, state)
             emf = state.emf_pu * rng.uniform(0.97, 1.03, size)

@@ -22,7 +22,7 @@ from openphase.model import (
     make_feeder,
 )
 from openphase.model.feeder import buses
-from openphase.model.topology import edges, forest, tree_path
+from openphase.model.topology import edges, forest, shortest_path, tree_path
 
 SOURCE = Source(bus="S", kv_ll=12.0, emf_pu=1.0, z1_ohm=0j, z2_ohm=0j, z0_ohm=0j, frequency_hz=50.0)
 
@@ -210,23 +210,8 @@ def test_paths_in_the_tree() -> None:
             ["f: switches 'tie': to must be connected with 'S' while ties are open, got 'E'"],
         ),
         (
-            {"lines": (*TREE, line("5", "B", "C"))},
-            ["f: lines '3' must not close a loop while ties are open, here with '2', '5'"],
-        ),
-        (
-            {"lines": (*TREE, line("5", "S", "A"))},
-            ["f: lines '5' must not close a loop while ties are open, here with '1'"],
-        ),
-        (
-            {"switches": (replace(TIE, closed=True),)},
-            ["f: lines '4' must not close a loop while ties are open, here with 'tie', '2', '1'"],
-        ),
-        (
-            {"switches": (TIE, switch("other", "C", "D"))},
-            [
-                "f: switches 'other' must not be a second tie beside 'tie':"
-                " one loop is solved, not several"
-            ],
+            {"switches": (switch("1", "B", "D", closed=True), switch("2", "D", "B", closed=True))},
+            ["f: switches '2' must not close a loop without impedance, here with '1'"],
         ),
         (
             {"sections": (("s1", "s1"), ("s1", "a2"), ("a2", "s1"))},
@@ -261,6 +246,41 @@ def test_a_name_twice_in_different_tables_is_fine() -> None:
 def test_sections_that_are_fine() -> None:
     pairs = (("s1", "a1"), ("s1", "a2"), ("a2", "b2"), ("d4", "s4"), ("a1", "b2"))
     assert len(feeder(sections=pairs, switches=(TIE,)).sections) == 5
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        {"lines": (*TREE, line("5", "B", "C"))},
+        {"lines": (*TREE, line("5", "S", "A"))},
+        {"switches": (replace(TIE, closed=True),)},
+        {"switches": (TIE, switch("other", "C", "D"), switch("third", "B", "C", closed=True))},
+    ],
+)
+def test_loops_and_ties_are_as_many_as_there_are(extra: dict[str, object]) -> None:
+    assert set(buses(feeder(**extra))) == set("SABCD")  # type: ignore[arg-type]
+
+
+def test_the_shortest_path_has_the_fewest_edges() -> None:
+    built = feeder(lines=(*TREE, line("5", "B", "D"), line("6", "S", "A")), switches=(TIE,))
+    graph = edges(built)
+    passed, taken = shortest_path(graph, "C", "D")
+    assert len(taken) == 3
+    assert passed == ["C", "A", *passed[2:3], "D"]
+    assert [edge.name for edge in shortest_path(graph, "S", "A")[1]] == ["1"]
+    assert [edge.name for edge in shortest_path(graph, "S", "A", {"6"})[1]] == ["6"]
+    assert [edge.name for edge in shortest_path(graph, "B", "S", {"6"})[1]] == ["2", "6"]
+    assert shortest_path(graph, "A", "A") == (["A"], [])
+    assert shortest_path(graph, "A", "nowhere") == ([], [])
+
+
+def test_in_a_tree_it_is_the_only_one() -> None:
+    built = feeder(switches=(TIE, switch("link", "C", "E", closed=True)))
+    graph = edges(built)
+    tree = forest(graph, ["S"])[0]
+    for start in tree:
+        for end in tree:
+            assert shortest_path(graph, start, end) == tree_path(tree, start, end)
 
 
 def test_a_point_stays_on_its_side_of_an_open_switch() -> None:

@@ -219,7 +219,7 @@ def test_nothing_is_ever_nan_and_evidence_says_blocked() -> None:
         before = looks(at, at.states(len(MASKS)))
         line = at.feeder.lines[int(rng.integers(len(at.feeder.lines)))].name
         answer = looks(at, opened(at, at.steady, line, float(rng.uniform(0, 1)), *MASKS))
-        for field in (answer.v, answer.i, answer.stub, answer.unit_v_pu):
+        for field in (answer.v, answer.i, answer.stub, answer.winding_v_pu):
             assert np.isfinite(field).all()
         flagged += int((answer.flags != 0).sum())
         points = at.points

@@ -120,7 +120,7 @@ def test_everything_in_a_loop_has_something_beyond_it() -> None:
     assert find_points(own, radial).terminals == ()
     ring = {"BC", "CM", "BL"}
     of_ring = [k for k, p in enumerate(loop.pieces) if p and (p.line in ring or p.line is None)]
-    assert loop.has_chord
+    assert loop.chords
     assert loop.equipped[of_ring].all()
 
 

@@ -87,7 +87,7 @@ def solve_both(
     state = steady_state(network)
     before = solve(network, state)
     oracle_before = solve_dense(feeder, closed)
-    after = solve(network, event_state(network, state, event), start=before.unit_v_pu)
+    after = solve(network, event_state(network, state, event), start=before.winding_v_pu)
     oracle = solve_dense(feeder, closed, event, start=oracle_before)
     return (
         gap_pu(feeder, network, before, oracle_before, None),
@@ -144,7 +144,7 @@ def test_loops_breaks_and_connections_all_occur_in_the_sample() -> None:
         seen.add("step" if event.step_line else "no step")
         if seed % 4 == 0 and any(s.name == "TIE" for s in feeder.switches):
             network = compile_network(feeder, frozenset(s.name for s in feeder.switches))
-            assert network.has_chord
+            assert network.chords
             if event.open_line:
                 edge, _ = locate(network, event.open_line, event.open_fraction)
                 on_chord = edge == len(network.nodes)

@@ -9,16 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 from oracles.dense import DenseSolution, NoSolutionError, NotConvergedError, solve_dense
 from oracles.dense import Event as DenseEvent
+from oracles.dense_inline import nominal_volts
 from oracles.random_happenings import Happening, dense_event
 
+from openphase.model.events.base import apply_event
+from openphase.model.machine_state import carried_over
 from openphase.model.network import Network, detached_end
 from openphase.model.parts import Feeder
+from openphase.model.solve import solve, steady_state
 from openphase.model.solver.breaks import DEAD, FLOATING
-from openphase.model.states import NOT_CONVERGED, Answer
+from openphase.model.states import NOT_CONVERGED, Answer, unit_voltages
 
-__all__ = ["TOLERANCE", "Case", "Outcome", "compare", "gap_pu"]
+__all__ = ["TOLERANCE", "Case", "Outcome", "compare", "gap_pu", "outcomes"]
 
 TOLERANCE = 1e-9
+LOOSE = 1e-9
+"""Share of a bus in a direction of the null space from which on the bus moves with it."""
 
 Complex = NDArray[np.complex128]
 
@@ -47,24 +53,29 @@ class Case:
 def gap_pu(case: Case, answer: Answer, oracle: DenseSolution, event: DenseEvent) -> float:
     """Largest difference, of voltages in pu of nominal and currents in pu of 1 MVA.
 
-    Where there are larger ones, at resonance or a fault, in pu of the largest.
+    Where there are larger ones, at resonance or a fault, in pu of the largest. Of a voltage that
+    is not determined in some direction, only what it is in the others counts.
     """
     network, feeder = case.network, case.feeder
-    highest = max(np.abs(v).max() for v in [*oracle.v.values(), *oracle.stubs.values()])
-    v_base = max(feeder.source.v_phase_v, float(highest))
-    largest = max(np.abs(i).max() for i in [*oracle.i_from.values(), oracle.i_source])
-    i_base = max(1e6 / (3 * feeder.source.v_phase_v), float(largest))
+    volts = _volts(case)
+    known = [*oracle.v.items(), *oracle.stubs.items()]
+    highest = max(1.0, *(float(np.abs(v).max()) / volts[name] for name, v in known))
     gaps = [0.0]
 
     def compare_v(name: str, ours: Complex, theirs: Complex) -> None:
-        for k in range(3):
-            if (name, k) not in oracle.floating:
-                gaps.append(abs(ours[k] - theirs[k]) / v_base)
+        gap = ours - theirs
+        if oracle.loose[name].shape[1]:
+            u, s, _ = np.linalg.svd(oracle.loose[name])
+            free = u[:, : int((s > LOOSE).sum())]
+            gap = gap - free @ (free.conj().T @ gap)
+        gaps.append(float(np.abs(gap).max()) / (volts[name] * highest))
 
     ours = {theirs: own for own, theirs in case.detached.items()}
     for bus, v in oracle.v.items():
         compare_v(bus, answer.v[network.node(ours.get(bus, bus)), :, 0], v)
+    bases = _amperes(case, oracle, volts)
     for line in feeder.lines:
+        i_base = bases[volts[line.from_bus]]
         edges = network.edges_of(line.name)
         first, last = edges[0], edges[-1]
         start = answer.i[2 * first + (not network.upward[first]), :, 0]
@@ -81,13 +92,40 @@ def gap_pu(case: Case, answer: Answer, oracle: DenseSolution, event: DenseEvent)
     return max(gaps)
 
 
+def _volts(case: Case) -> dict[str, float]:
+    """Nominal volts by the reference's names: buses, detached ends and stubs."""
+    volts = nominal_volts(case.feeder)
+    for line in case.feeder.lines:
+        ends = (f"{line.name}@{bus}" for bus in (line.from_bus, line.to_bus))
+        names = [*ends, f"{line.name}.p", f"{line.name}.q"]
+        volts |= dict.fromkeys(names, volts[line.from_bus])
+    return volts
+
+
+def _amperes(case: Case, oracle: DenseSolution, volts: dict[str, float]) -> dict[float, float]:
+    """Base current by nominal voltage."""
+    bases = {v: 1e6 / (3 * v) for v in volts.values()}
+    for line in case.feeder.lines:
+        v = volts[line.from_bus]
+        bases[v] = max(bases[v], float(np.abs(oracle.i_from[line.name]).max()))
+    v = case.feeder.source.v_phase_v
+    bases[v] = max(bases[v], float(np.abs(oracle.i_source).max()))
+    return bases
+
+
 def winding_voltages(
     case: Case, answer: Answer, event: DenseEvent
 ) -> dict[str, NDArray[np.float64]]:
     """The ladder's voltages, as a start for the reference."""
     network = case.network
-    units = network.tree.load_unit
-    found = {name: answer.unit_v_pu[units[n], :3, 0] for n, name in enumerate(network.loads)}
+    units, tree = unit_voltages(answer, len(network.units)), network.tree
+    branches = answer.winding_v_pu[4 * (len(network.units) + 1) :, 0]
+    found = {
+        name: units[tree.load_unit[n], :3, 0]
+        if tree.load_unit[n] >= 0
+        else branches[tree.branch_load == n]
+        for n, name in enumerate(network.loads)
+    }
     own = network.machines
     for m, unit in enumerate(own.unit):
         motors = own.motor_load.size
@@ -96,10 +134,10 @@ def winding_voltages(
             if m < motors
             else f"{own.ders[m - motors]}.der"
         )
-        found[name] = np.full(3, answer.unit_v_pu[unit, 3, 0])
+        found[name] = np.full(3, units[unit, 3, 0])
     for n, shunt in enumerate(event.shunts):
         if shunt.exponent != 2.0:
-            found[f"shunt {n}"] = answer.unit_v_pu[-1, [shunt.phase], 0]
+            found[f"shunt {n}"] = units[-1, [shunt.phase], 0]
     return found
 
 
@@ -144,3 +182,20 @@ def compare(
     if max(gap, moved) > TOLERANCE:
         return replace(found, how="differ"), oracle
     return replace(found, how="elsewhere", gap=gap), held
+
+
+def outcomes(case: Case) -> list[Outcome]:
+    """Before the event, and after it."""
+    network, event = case.network, case.happening.event
+    steady = steady_state(network)
+    first, second = apply_event(network, steady, steady, event)
+    answer = solve(network, first)
+    state: dict[str, Any] = {"opened": case.opened}
+    before, oracle = compare(case, answer, case.event(after=False), None, **state)
+    if before.how not in ("agree", "elsewhere"):
+        return [before]
+    second = carried_over(network, first, answer, second, event.der_factor)
+    answer = solve(network, second, start=answer.unit_v_pu)
+    scale = {name: float(event.load_factor[n, 0]) for n, name in enumerate(network.loads)}
+    state |= {"before": oracle, "load_scale": scale}
+    return [before, compare(case, answer, case.event(after=True), oracle, **state)[0]]

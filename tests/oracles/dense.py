@@ -5,8 +5,8 @@ Modified nodal analysis. Unknowns are the phase-to-earth voltages of every physi
 every line piece, switch, source and winding, so that zero impedances, closed switches,
 isolated neutrals and open conductors are exact: an element is ``V_a - V_b - Z I = 0``, or
 ``I = 0`` where it is open. No sequence network, no reduction of the network to its tree, no
-referral of LV quantities: transformers are three single-phase two-winding units with their
-true turns ratios and LV nodes of their own.
+referral of LV quantities: transformers are single-phase units with their true turns ratios
+and nodes of their own. A conductor that is not there has no equation but ``V = 0``.
 
 What is not determined (an isolated conductor without a path to earth) lies in the null
 space of the matrix; there the solution of least norm is taken and the nodes are reported in
@@ -19,20 +19,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
-from oracles.dense_circuit import (
-    FORTESCUE,
-    Circuit,
-    Complex,
-    Floats,
-    Found,
-    Group,
-    NoSolutionError,
-    NotConvergedError,
-    solve_circuit,
-)
+from oracles.dense_circuit import Circuit, Found, NoSolutionError, NotConvergedError, solve_circuit
+from oracles.dense_groups import FORTESCUE, Complex, Group, Law
+from oracles.dense_inline import Through, add_inline, add_regulator, nominal_volts, summed
 from oracles.dense_parts import (
     KV_LV,
     Cut,
@@ -43,26 +34,16 @@ from oracles.dense_parts import (
     add_der,
     add_line,
     add_load,
-    add_regulator,
     add_source,
     add_transformer,
+    branches,
     hung_on_lines,
-    power_va,
+    rows,
     windings,
 )
+from oracles.dense_records import DenseSolution, Event, Shunt
 
-from openphase.model.parts import (
-    Capacitor,
-    Connection,
-    Der,
-    Feeder,
-    Line,
-    Load,
-    Place,
-    Regulator,
-    Switch,
-    Transformer,
-)
+from openphase.model.parts import Connection, Der, Feeder, Line, Load, Switch
 
 __all__ = [
     "FORTESCUE",
@@ -75,114 +56,9 @@ __all__ = [
 ]
 
 STEP_NODE = "tee step"
+ROOT = float(np.sqrt(3.0))
 FLOATING_TOLERANCE = 1e-7
 """Component of a (unit) null vector from which a node counts as floating."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shunt:
-    """An admittance at the event: from a phase to earth, or to another phase.
-
-    ``where``: the from-side stub p, the to-side stub q, or the far place.
-    """
-
-    where: Literal["p", "q", "far"]
-    phase: int
-    other: int | None = None
-    siemens: complex
-    exponent: float = 2.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Event:
-    """What is other than normal in the state that is solved; the defaults are nothing.
-
-    A tee at exactly the fraction of a break hangs on the from-bus side, with
-    ``before_tees`` on the to-bus side; a step load hangs on the from-bus side.
-
-    Parameters
-    ----------
-    open_line, open_fraction, open_phases
-        Conductors (0..2) broken at that fraction of the line, counted from its from-bus.
-        The line is cut there even where no phase is open: its stubs are nodes, and its
-        charging is shared between the parts.
-    step_line, step_fraction, step_kw, step_phases, step_exponent
-        Grounded-wye load of unity power factor; ``step_kw`` is the total at nominal
-        voltage and is shared equally among the phases.
-    shunts, far
-        What is connected at the stubs and at a second place besides.
-    emf_scale
-        Factor on the source's EMF.
-    taps, ders
-        By regulator: factors on the ratio of the three phases. By DER: factor on what it
-        delivers after the event; 0: tripped.
-    """
-
-    open_line: str | None = None
-    open_fraction: float = 0.5
-    open_phases: tuple[int, ...] = ()
-    before_tees: bool = False
-    step_line: str | None = None
-    step_fraction: float = 0.5
-    step_kw: float = 0.0
-    step_phases: tuple[int, ...] = (0, 1, 2)
-    step_exponent: float = 2.0
-    shunts: tuple[Shunt, ...] = ()
-    far: Place | None = None
-    emf_scale: float = 1.0
-    taps: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
-    ders: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class DenseSolution:
-    """Phasors of one state; every array has shape (3,), volts to earth or amperes.
-
-    Parameters
-    ----------
-    v
-        Voltage of each bus; of a detached line end as ``"<line>@<bus>"``.
-    stubs
-        Voltage of ``"<line>.p"`` and ``"<line>.q"``: from-bus and to-bus side of the break.
-    lv
-        LV terminal voltages of each transformer (their sum is zero behind a D winding).
-    i_from, i_to
-        Current INTO each line at its from and to end, the charging there included.
-    i_switch
-        Current through each switch and regulator, from its from-bus to its to-bus (of a
-        regulator, on the to-side).
-    i_source
-        Current out of the source.
-    floating
-        (key of ``v`` or ``stubs``, phase) of voltages that the circuit does not determine.
-    load_pu
-        Voltage magnitudes on which loads, motors and DER depend, pu, by group.
-    load_va, source_va, loss_va, charging_va
-        Power taken by each load, motor (``NAME.motor``), DER (``NAME.der``), capacitor
-        (``NAME.capacitor``), step load (``step``) and shunt (``shunt N``); given by the EMF;
-        lost in the source's impedance and neutral, lines and transformers; taken by the
-        lines' charging.
-    kept
-        By DER: positive-sequence winding voltage and the current fed in there.
-    iterations
-        Linear solutions that were needed.
-    """
-
-    v: dict[str, Complex]
-    stubs: dict[str, Complex]
-    lv: dict[str, Complex]
-    i_from: dict[str, Complex]
-    i_to: dict[str, Complex]
-    i_switch: dict[str, Complex]
-    i_source: Complex
-    floating: set[tuple[str, int]]
-    load_pu: dict[str, Floats]
-    load_va: dict[str, complex]
-    source_va: complex
-    loss_va: complex
-    charging_va: complex
-    kept: dict[str, Kept]
-    iterations: int
 
 
 def solve_dense(
@@ -248,31 +124,43 @@ def solve_dense(
         hung[happening.far.line][far] = happening.far.at
     circuit = Circuit(s_base=1e6 / 3)
     handles = _add_network(circuit, feeder, closed, happening, opened, emf_scale, hung)
-    kv = feeder.source.kv_ll
+    volts = handles.volts
     handles.lv = {
-        t.name: add_transformer(circuit, t, kinds[t.name], node_of[f"T {t.name}"], kv, delta_step)
+        t.name: add_transformer(
+            circuit,
+            t,
+            kinds[t.name],
+            node_of[f"T {t.name}"],
+            volts[node_of[f"T {t.name}"]] * ROOT / 1000.0,
+            delta_step,
+        )
         for t in feeder.transformers
     }
 
-    def where(transformer: str | None, key: str, kind: str) -> Windings:
-        if transformer is None:
-            return windings(node_of[key], kind, kv)
-        kind = "wye" if kinds[transformer].endswith("/Yg") else "delta"
-        return windings(f"{transformer}.lv", kind, KV_LV)
+    def where(part: Load | Der, key: str) -> Windings:
+        if part.transformer is not None:
+            kind = "wye" if kinds[part.transformer].endswith("/Yg") else "delta"
+            return windings(f"{part.transformer}.lv", kind, KV_LV)
+        node = node_of[key]
+        if isinstance(part, Der):
+            return branches(node, "wye", "abc", None, volts[node])
+        return branches(node, part.connection, part.phases, part.branch_kv, volts[node])
 
     for load in feeder.loads:
-        at = where(load.transformer, f"L {load.name}", load.connection)
-        va = power_va(load.kw, load.power_factor) * (load_scale or {}).get(load.name, 1.0)
-        add_load(circuit, load, at, va, (exponents or {}).get(load.name, load.exponent))
+        scale = (load_scale or {}).get(load.name, 1.0)
+        exponent = (exponents or {}).get(load.name, load.exponent)
+        add_load(circuit, load, where(load, f"L {load.name}"), scale, exponent)
     for der in feeder.ders:
-        at = where(der.transformer, f"G {der.name}", "wye")
         kept = None if before is None else before.kept[der.name]
         share = happening.ders.get(der.name, 1.0)
-        add_der(circuit, der, at, feeder.source.v_phase_v, kept, share)
+        hv = node_of[f"G {der.name}" if der.transformer is None else f"T {der.transformer}"]
+        add_der(circuit, der, where(der, f"G {der.name}"), volts[hv], kept, share)
     for bank in feeder.capacitors:
-        add_capacitor(circuit, bank, windings(node_of[f"C {bank.name}"], bank.connection, kv))
-    _add_step(circuit, happening, feeder.source.v_phase_v)
-    _add_shunts(circuit, happening, far, feeder.source.v_phase_v)
+        node = node_of[f"C {bank.name}"]
+        at = branches(node, bank.connection, bank.phases, bank.branch_kv, volts[node])
+        add_capacitor(circuit, bank, at)
+    _add_step(circuit, happening, volts)
+    _add_shunts(circuit, happening, far, volts)
     found = solve_circuit(circuit, start.load_pu if start is not None else {}, hold=hold)
     return _solution(circuit, handles, found, feeder)
 
@@ -295,21 +183,23 @@ def _check(feeder: Feeder, event: Event, closed: frozenset[str], opened: frozens
     _known("DER", event.ders, {d.name for d in feeder.ders})
 
 
-def _add_step(circuit: Circuit, event: Event, v_phase: float) -> None:
+def _add_step(circuit: Circuit, event: Event, volts: Mapping[str, float]) -> None:
     """The event's single- to three-phase grounded load at its tee."""
     if event.step_line is None:
         return
-    count = len(event.step_phases)
+    count, v_phase = len(event.step_phases), volts[STEP_NODE]
     circuit.groups["step"] = Group(
         plus=[(STEP_NODE, k) for k in event.step_phases],
         minus=[None] * count,
         v_nominal=v_phase,
         y_s=event.step_kw * 1000.0 / count / v_phase**2 * np.eye(count, dtype=np.complex128),
-        exponent=event.step_exponent,
+        law=Law(exponent=event.step_exponent),
     )
 
 
-def _add_shunts(circuit: Circuit, event: Event, far: str | None, v_phase: float) -> None:
+def _add_shunts(
+    circuit: Circuit, event: Event, far: str | None, volts: Mapping[str, float]
+) -> None:
     nodes = {"p": f"{event.open_line}.p", "q": f"{event.open_line}.q", "far": far}
     for n, shunt in enumerate(event.shunts):
         node = nodes[shunt.where]
@@ -317,9 +207,9 @@ def _add_shunts(circuit: Circuit, event: Event, far: str | None, v_phase: float)
         circuit.groups[f"shunt {n}"] = Group(
             plus=[(node, shunt.phase)],
             minus=[None if shunt.other is None else (node, shunt.other)],
-            v_nominal=v_phase,
+            v_nominal=volts[node],
             y_s=np.array([[shunt.siemens]], dtype=np.complex128),
-            exponent=shunt.exponent,
+            law=Law(exponent=shunt.exponent),
         )
 
 
@@ -332,7 +222,9 @@ class _Handles:
     emf: Complex
     i_source: list[int]
     ends: dict[str, tuple[LineEnd, LineEnd]]
-    switches: dict[str, list[int]]
+    switches: dict[str, tuple[Switch, list[int]]]
+    through: dict[str, Through]
+    volts: dict[str, float]
     lv: dict[str, str] = field(default_factory=dict)
 
 
@@ -355,13 +247,17 @@ def _add_network(
     emf_scale: float,
     hung: Mapping[str, Mapping[str, float]],
 ) -> _Handles:
-    """Add buses, source, lines, switches and regulators."""
-    v = feeder.source.v_phase_v
+    """Add buses, source, lines, switches, regulators and in-line transformers."""
     joined = {line.name: _ends(line, feeder, opened) for line in feeder.lines}
+    volts = nominal_volts(feeder)
+    for line in feeder.lines:
+        own = volts[line.from_bus]
+        names = [*joined[line.name], f"{line.name}.p", f"{line.name}.q", *hung[line.name]]
+        volts |= dict.fromkeys(names, own)
     buses = _buses(feeder)
     buses += [end for ends in joined.values() for end in ends if "@" in end]
     for bus in buses:
-        circuit.node(bus, v)
+        circuit.node(bus, volts[bus])
     i_source, emf = add_source(circuit, feeder.source, emf_scale * event.emf_scale)
     ends = {}
     for line in feeder.lines:
@@ -374,17 +270,24 @@ def _add_network(
                 before_tees=event.before_tees,
             )
         ends[line.name] = add_line(
-            circuit, line, feeder.source, hung[line.name], cut, joined[line.name]
+            circuit, feeder, line, hung[line.name], cut, joined[line.name], volts[line.from_bus]
         )
-    switches = {
-        s.name: circuit.gap(s.from_bus, s.to_bus, () if s.name in closed else (0, 1, 2), v)
-        for s in feeder.switches
-    }
+    switches = {}
+    for s in feeder.switches:
+        there = rows(s.phases)
+        broken = () if s.name in closed else there
+        gap = circuit.gap(s.from_bus, s.to_bus, broken, volts[s.from_bus], there)
+        switches[s.name] = (s, gap)
+    through = {}
     for regulator in feeder.regulators:
         factor = event.taps.get(regulator.name, (1.0, 1.0, 1.0))
-        switches[regulator.name] = add_regulator(circuit, regulator, factor, v)
+        through[regulator.name] = add_regulator(
+            circuit, regulator, factor, volts[regulator.from_bus]
+        )
+    for unit in feeder.inline_transformers:
+        through[unit.name] = add_inline(circuit, unit, volts[unit.from_bus], volts[unit.to_bus])
     stubs = [f"{event.open_line}.{side}" for side in "pq"] if event.open_line else []
-    return _Handles(buses, stubs, emf, i_source, ends, switches)
+    return _Handles(buses, stubs, emf, i_source, ends, switches, through, volts)
 
 
 def _solution(circuit: Circuit, handles: _Handles, found: Found, feeder: Feeder) -> DenseSolution:
@@ -397,7 +300,7 @@ def _solution(circuit: Circuit, handles: _Handles, found: Found, feeder: Feeder)
         return np.asarray(x[column : column + 3], dtype=np.complex128)
 
     def into(end: LineEnd) -> Complex:
-        return np.asarray(end.sign * x[end.columns] + end.y @ at(end.node))
+        return _spread(end.sign * x[end.columns], end.phases) + end.y @ at(end.node)
 
     def kept(name: str) -> Kept:
         forward = FORTESCUE[:, 1].conj() / 3
@@ -410,20 +313,27 @@ def _solution(circuit: Circuit, handles: _Handles, found: Found, feeder: Feeder)
     if circuit.neutral is not None:
         column, y = circuit.neutral
         in_neutral = complex(abs(x[column]) ** 2 * np.conj(y))
+    i_switch = {
+        name: _spread(x[own], rows(switch.phases))
+        for name, (switch, own) in handles.switches.items()
+    }
+    i_out = {name: summed(own.out, x) for name, own in handles.through.items()}
+    i_switch |= {regulator.name: i_out[regulator.name] for regulator in feeder.regulators}
+    named = [*handles.buses, *handles.stubs]
+    places = {name: slice(circuit.nodes[name][0], circuit.nodes[name][0] + 3) for name in named}
     return DenseSolution(
         v={bus: at(bus) for bus in handles.buses},
         stubs={stub: at(stub) for stub in handles.stubs},
         lv={name: at(node) for name, node in handles.lv.items()},
         i_from={name: into(first) for name, (first, _) in handles.ends.items()},
         i_to={name: into(last) for name, (_, last) in handles.ends.items()},
-        i_switch={name: x[columns] for name, columns in handles.switches.items()},
+        i_switch=i_switch,
+        i_into={name: summed(own.into, x) for name, own in handles.through.items()},
+        i_out=i_out,
         i_source=x[handles.i_source],
-        floating={
-            (name, k)
-            for name in [*handles.buses, *handles.stubs]
-            for k in range(3)
-            if loose[circuit.nodes[name][0] + k]
-        },
+        floating={(name, k) for name in named for k in range(3) if loose[places[name]][k]},
+        loose={name: found.null[places[name]] for name in named},
+        absent={(name, k) for name, k in circuit.absent() if name in places},
         load_pu=found.pu,
         load_va={name: complex(v @ found.drawn_a[name].conj()) for name, v in found.across.items()},
         source_va=complex(handles.emf @ x[handles.i_source].conj()),
@@ -434,15 +344,24 @@ def _solution(circuit: Circuit, handles: _Handles, found: Found, feeder: Feeder)
     )
 
 
+def _spread(values: Complex, phases: list[int]) -> Complex:
+    """(3,) of what there is of some phases, 0 in the others."""
+    whole = np.zeros(3, np.complex128)
+    whole[phases] = values
+    return whole
+
+
 def _buses(feeder: Feeder) -> list[str]:
     """Every bus that is named anywhere, once, in order of appearance."""
     named = [feeder.source.bus]
-    edges: list[Line | Switch | Regulator] = [*feeder.lines, *feeder.switches, *feeder.regulators]
-    for edge in edges:
+    for edge in (
+        *feeder.lines,
+        *feeder.switches,
+        *feeder.regulators,
+        *feeder.inline_transformers,
+    ):
         named += [edge.from_bus, edge.to_bus]
-    items: list[Transformer | Load | Der | Capacitor] = [*feeder.transformers, *feeder.loads]
-    items += [*feeder.ders, *feeder.capacitors]
-    for item in items:
+    for item in (*feeder.transformers, *feeder.loads, *feeder.ders, *feeder.capacitors):
         if item.place is not None and item.place.bus is not None:
             named.append(item.place.bus)
     return list(dict.fromkeys(named))

@@ -10,31 +10,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from oracles.dense_groups import Complex, Floats, Group, Terminal
 from scipy.linalg.lapack import zgecon, zgetrf, zgetrs
 
 __all__ = [
-    "FLOOR_PU",
-    "FORTESCUE",
     "Circuit",
-    "Complex",
-    "Floats",
     "Found",
-    "Group",
     "NoSolutionError",
     "NotConvergedError",
-    "Terminal",
-    "machine_matrix",
     "solve_circuit",
 ]
 
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
-Terminal = tuple[str, int] | None
-"""A node and its phase, or None: earth."""
-
-FLOOR_PU = 0.7
-"""Voltage below which what depends on it is a constant impedance."""
 TOLERANCE = 1e-13
 MAX_ITERATIONS = 1000
 NULL_TOLERANCE = 1e-11
@@ -43,10 +29,6 @@ REFINEMENTS = 3
 WELL_CONDITIONED = 1e-10
 """Reciprocal condition from which a matrix has no null space to look for."""
 
-A = np.exp(2j * np.pi / 3)
-FORTESCUE: Complex = np.array([[1, 1, 1], [1, A**2, A], [1, A, A**2]], dtype=np.complex128)
-"""Phase from sequence quantities, in the order 0, 1, 2."""
-
 
 class NotConvergedError(RuntimeError):
     """No state was found in which voltages and what depends on them agree."""
@@ -54,39 +36,6 @@ class NotConvergedError(RuntimeError):
 
 class NoSolutionError(NotConvergedError):
     """No state fulfils the equations, such as a current source with no way back."""
-
-
-def machine_matrix(y0: complex, y1: complex, y2: complex) -> Complex:
-    """Admittance between three windings' voltages and currents, from that of each sequence."""
-    return np.asarray(FORTESCUE @ np.diag([y0, y1, y2]) @ FORTESCUE.conj().T / 3)
-
-
-@dataclass(slots=True, kw_only=True)
-class Group:
-    """Branches whose nominal admittance is multiplied by max(|V|, floor)**(exponent - 2).
-
-    Each branch by its own voltage; those of a machine all by their positive sequence.
-    """
-
-    plus: list[Terminal]
-    minus: list[Terminal]
-    v_nominal: float
-    y_s: Complex  #: (n, n) at nominal voltage, varies
-    exponent: float
-    machine: bool = False
-    fixed_s: Complex | float = 0.0  #: (n, n) besides
-    fed_a: Complex | float = 0.0  #: (n,) current fed in, whatever the voltage
-
-    def magnitudes(self, v: Complex) -> Floats:
-        """(n,) the voltages that count, pu."""
-        if self.machine:
-            return np.full(3, abs(FORTESCUE[:, 1].conj() @ v) / 3 / self.v_nominal)
-        return np.asarray(np.abs(v) / self.v_nominal, dtype=np.float64)
-
-    def varying(self, pu: Floats) -> Complex:
-        """(n, n) voltage-dependent part of the admittance."""
-        factor = np.maximum(pu, FLOOR_PU) ** (self.exponent - 2.0)
-        return np.asarray(self.y_s * factor[:, None], dtype=np.complex128)
 
 
 @dataclass(slots=True)
@@ -99,7 +48,9 @@ class Circuit:
     entries: list[tuple[int, int, complex]] = field(default_factory=list)
     rhs: dict[int, complex] = field(default_factory=dict)
     nodes: dict[str, tuple[int, int]] = field(default_factory=dict)
-    """First of the three voltage columns and of the three current-balance rows."""
+    """First of the three voltage columns and of the three current-balance rows (of a ``point``
+    the only ones)."""
+    points: set[str] = field(default_factory=set)
     groups: dict[str, Group] = field(default_factory=dict)
     losses: list[tuple[Complex, list[int]]] = field(default_factory=list)
     charging: list[tuple[str, Complex]] = field(default_factory=list)
@@ -126,6 +77,29 @@ class Circuit:
         self.nodes[name] = (column, first)
         return name
 
+    def point(self, name: str, v_base: float) -> Terminal:
+        """A single conductor's node, such as a neutral."""
+        if name in self.nodes:
+            raise ValueError(f"two nodes are called {name!r}")
+        self.nodes[name] = (self.columns(1, v_base)[0], self.row(self.s_base / v_base, []))
+        self.points.add(name)
+        return name, 0
+
+    def absent(self) -> set[tuple[str, int]]:
+        """Phases of nodes to which nothing is connected at all."""
+        columns = {column for _, column, _ in self.entries}
+        rows = {row for row, _, _ in self.entries}
+        for group in self.groups.values():
+            for terminal in (*group.plus, *group.minus):
+                if terminal is not None:
+                    columns.add(self.nodes[terminal[0]][0] + terminal[1])
+        return {
+            (name, k)
+            for name, (column, row) in self.nodes.items()
+            for k in range(3 if name not in self.points else 1)
+            if column + k not in columns and row + k not in rows
+        }
+
     def voltage(self, terminal: Terminal, sign: complex) -> list[tuple[int, complex]]:
         """Term ``sign * V`` of an equation; nothing for earth."""
         if terminal is None:
@@ -145,25 +119,46 @@ class Circuit:
         ]
         self.charging.append((node, y))
 
-    def series(self, a: str, b: str, z: Complex, v_base: float) -> list[int]:
-        """Coupled conductors from node a to node b; the currents flow from a to b."""
-        current = self.columns(3, self.s_base / v_base)
-        for k in range(3):
-            self.leaves((a, k), current[k], 1)
-            self.leaves((b, k), current[k], -1)
-            drop = [(current[j], complex(-z[k, j])) for j in range(3)]
+    def series(
+        self, a: str, b: str, z: Complex, v_base: float, phases: Sequence[int] = (0, 1, 2)
+    ) -> list[int]:
+        """Coupled conductors of some phases from node a to node b; currents flow from a to b.
+
+        Row i of ``z`` is that of the phase that stands i-th in ``phases``.
+        """
+        current = self.columns(len(phases), self.s_base / v_base)
+        for n, k in enumerate(phases):
+            self.leaves((a, k), current[n], 1)
+            self.leaves((b, k), current[n], -1)
+            drop = [(current[j], complex(-z[n, j])) for j in range(len(phases))]
             self.row(v_base, self.voltage((a, k), 1) + self.voltage((b, k), -1) + drop)
         self.losses.append((z, current))
         return current
 
-    def gap(self, a: str, b: str, open_phases: Sequence[int], v_base: float) -> list[int]:
-        """Ideal conductors from a to b, those of ``open_phases`` interrupted."""
-        current = self.columns(3, self.s_base / v_base)
-        for k in range(3):
-            self.leaves((a, k), current[k], 1)
-            self.leaves((b, k), current[k], -1)
+    def branch(self, a: Terminal, b: Terminal, z: complex, v_base: float) -> int:
+        """One conductor between two terminals; the current flows from a to b."""
+        (current,) = self.columns(1, self.s_base / v_base)
+        self.leaves(a, current, 1)
+        self.leaves(b, current, -1)
+        self.row(v_base, self.voltage(a, 1) + self.voltage(b, -1) + [(current, -z)])
+        self.losses.append((np.array([[z]]), [current]))
+        return current
+
+    def gap(
+        self,
+        a: str,
+        b: str,
+        open_phases: Sequence[int],
+        v_base: float,
+        phases: Sequence[int] = (0, 1, 2),
+    ) -> list[int]:
+        """Ideal conductors of ``phases`` from a to b, those of ``open_phases`` interrupted."""
+        current = self.columns(len(phases), self.s_base / v_base)
+        for n, k in enumerate(phases):
+            self.leaves((a, k), current[n], 1)
+            self.leaves((b, k), current[n], -1)
             if k in open_phases:
-                self.row(self.s_base / v_base, [(current[k], 1)])
+                self.row(self.s_base / v_base, [(current[n], 1)])
             else:
                 self.row(v_base, self.voltage((a, k), 1) + self.voltage((b, k), -1))
         return current
@@ -205,6 +200,9 @@ def _matrices(circuit: Circuit) -> _Matrices:
     fixed = np.zeros((size, size), dtype=np.complex128)
     for r, c, value in circuit.entries:
         fixed[r, c] += value
+    for name, k in circuit.absent():
+        column, row = circuit.nodes[name]
+        fixed[row + k, column + k] = rows[row + k] / columns[column + k]
     rhs = np.zeros(size, dtype=np.complex128)
     for r, value in circuit.rhs.items():
         rhs[r] = value
@@ -302,11 +300,14 @@ def solve_circuit(circuit: Circuit, start: Mapping[str, Floats], *, hold: bool =
         own = [group.magnitudes(v[span]) for group, span in zip(groups, spans, strict=True)]
         return np.concatenate([*own, np.empty(0)])
 
+    def moves(one: Floats, other: Floats) -> float:
+        """Largest change of a voltage that changes anything."""
+        same = [g.same(one[span], other[span]) for g, span in zip(groups, spans, strict=True)]
+        changed = ~np.concatenate([*same, np.empty(0, np.bool_)]).astype(bool)
+        return float(np.abs(one - other)[changed].max(initial=0.0))
+
     given = [start.get(name, np.ones(len(g.plus))) for name, g in circuit.groups.items()]
     pu = np.concatenate([*given, np.empty(0)])
-    bends = np.repeat([g.exponent != 2.0 and bool(np.any(g.y_s)) for g in groups], sizes).astype(
-        bool
-    )
     y_start = admittance(pu)
     matrix = parts.fixed + parts.into @ y_start @ parts.across
     left, right = _null_spaces(matrix)
@@ -318,14 +319,12 @@ def solve_circuit(circuit: Circuit, start: Mapping[str, Floats], *, hold: bool =
         reduced = eye + z @ (admittance(pu) - y_start)
         v = np.asarray(np.linalg.solve(reduced, v_start), dtype=np.complex128)
         found = magnitudes(v)
-        change = found - pu
-        relevant = change[bends & (np.maximum(found, pu) > FLOOR_PU)]
-        if not len(relevant) or np.abs(relevant).max() <= TOLERANCE:
+        if moves(found, pu) <= TOLERANCE:
             break
-        pu = pu + (1.0 if count <= 100 else 0.5 if count <= 300 else 0.2) * change
+        pu = pu + (1.0 if count <= 100 else 0.5 if count <= 300 else 0.2) * (found - pu)
     else:
         if not hold:
-            raise NotConvergedError(f"no fixed point after {MAX_ITERATIONS} iterations: {change}")
+            raise NotConvergedError(f"no fixed point after {MAX_ITERATIONS} iterations")
 
     y = admittance(pu)
     whole = _Bordered(parts.fixed + parts.into @ y @ parts.across, left, right)
@@ -334,7 +333,7 @@ def solve_circuit(circuit: Circuit, start: Mapping[str, Floats], *, hold: bool =
         raise NoSolutionError("the circuit's equations contradict one another")
     v = parts.across @ x
     # the reduction at the start's admittances may be worse conditioned than the whole
-    worse = np.abs(magnitudes(v) - pu)[bends & (pu > FLOOR_PU)].max(initial=0.0)
+    worse = moves(magnitudes(v), pu)
     if not hold and worse > 1e-10 * max(1.0, pu.max(initial=0.0)):
         raise NotConvergedError("the reduced circuit and the whole disagree")
     names = list(circuit.groups)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from oracles.dense_circuit import FORTESCUE, Circuit, Complex, Group, Terminal, machine_matrix
+from oracles.dense_circuit import Circuit
+from oracles.dense_groups import FORTESCUE, Complex, Group, Law, Terminal, machine_matrix
 
 from openphase.model.parts import (
     Capacitor,
@@ -16,7 +17,6 @@ from openphase.model.parts import (
     Line,
     Load,
     Place,
-    Regulator,
     Source,
     Transformer,
 )
@@ -29,11 +29,14 @@ __all__ = [
     "add_der",
     "add_line",
     "add_load",
-    "add_regulator",
     "add_source",
     "add_transformer",
+    "branches",
+    "capacitance",
     "hung_on_lines",
+    "impedance",
     "power_va",
+    "rows",
     "windings",
 ]
 
@@ -41,10 +44,38 @@ KV_LV = 0.48
 """Line-to-line LV voltage of every transformer, kV; HV quantities do not depend on it."""
 
 
-def line_matrix(z1: complex, z0: complex) -> Complex:
-    """Phase impedance of a transposed line: self (Z0+2 Z1)/3, mutual (Z0-Z1)/3."""
-    mutual = (z0 - z1) / 3
-    return np.full((3, 3), mutual, dtype=np.complex128) + z1 * np.eye(3)
+def rows(phases: str) -> list[int]:
+    """Numbers of the phases, in their order."""
+    return [ord(phase) - ord("a") for phase in phases]
+
+
+def line_matrix(first: complex, zero: complex) -> Complex:
+    """Phase matrix of a transposed line: self (X0+2 X1)/3, mutual (X0-X1)/3."""
+    mutual = (zero - first) / 3
+    return np.full((3, 3), mutual, dtype=np.complex128) + first * np.eye(3)
+
+
+def impedance(feeder: Feeder, line: Line) -> Complex:
+    """(n, n) ohm of the whole line; row i is that of its i-th phase."""
+    if line.code is None:
+        assert line.z1_ohm_per_km is not None
+        assert line.z0_ohm_per_km is not None
+        z = line_matrix(line.z1_ohm_per_km, line.z0_ohm_per_km)[: len(line.phases)]
+        return z[:, : len(line.phases)] * line.length_km
+    code = next(code for code in feeder.codes if code.name == line.code)
+    return (np.array(code.r_ohm_per_km) + 1j * np.array(code.x_ohm_per_km)) * line.length_km
+
+
+def capacitance(feeder: Feeder, line: Line) -> Complex:
+    """(n, n) nF of the whole line, ordered alike."""
+    count = len(line.phases)
+    if line.code is None:
+        c = line_matrix(line.c1_nf_per_km, line.c0_nf_per_km)
+        return c[:count, :count] * line.length_km
+    code = next(code for code in feeder.codes if code.name == line.code)
+    if code.c_nf_per_km is None:
+        return np.zeros((count, count), np.complex128)
+    return np.array(code.c_nf_per_km, np.complex128) * line.length_km
 
 
 def source_matrix(source: Source) -> Complex:
@@ -76,7 +107,8 @@ def add_source(circuit: Circuit, source: Source, emf_scale: float) -> tuple[list
     """
     v = source.v_phase_v
     z = source_matrix(source)
-    emf = (source.emf_pu * v * emf_scale * FORTESCUE[:, 1]).astype(np.complex128)
+    size = source.emf_pu * v * emf_scale * np.exp(1j * np.radians(source.angle_deg))
+    emf = (size * FORTESCUE[:, 1]).astype(np.complex128)
     current = circuit.columns(3, circuit.s_base / v)
     neutral: list[tuple[int, complex]] = []
     if source.neutral == "isolated" or source.neutral_ohm:
@@ -111,6 +143,7 @@ class LineEnd:
     """Current into a line: a series current and the charging beside it."""
 
     columns: list[int]
+    phases: list[int]
     sign: float
     node: str
     y: Complex
@@ -118,17 +151,19 @@ class LineEnd:
 
 def add_line(
     circuit: Circuit,
+    feeder: Feeder,
     line: Line,
-    source: Source,
     hung: Mapping[str, float],
     cut: Cut | None,
     ends: tuple[str, str],
+    v: float,
 ) -> tuple[LineEnd, LineEnd]:
     """Chain of nominal pis through the tees and the cut; returns both ends' currents."""
-    v = source.v_phase_v
-    z = line_matrix(line.z1_ohm_per_km, line.z0_ohm_per_km) * line.length_km
-    siemens_per_nf = 2j * np.pi * source.frequency_hz * 1e-9 * line.length_km
-    y = line_matrix(line.c1_nf_per_km, line.c0_nf_per_km) * siemens_per_nf
+    phases = rows(line.phases)
+    z = impedance(feeder, line)
+    y = np.zeros((3, 3), np.complex128)
+    siemens_per_nf = 2j * np.pi * feeder.source.frequency_hz * 1e-9
+    y[np.ix_(phases, phases)] = capacitance(feeder, line) * siemens_per_nf
     stops = [(at, 1, node) for node, at in hung.items()]
     if cut is not None:
         stops.append((cut.fraction, 0 if cut.before_tees else 2, ""))
@@ -143,30 +178,19 @@ def add_line(
         if there != ends[1]:
             circuit.node(there, v)
         half: Complex = np.asarray(y * (at - done) / 2)
-        pieces.append((circuit.series(here, there, z * (at - done), v), half))
+        pieces.append((circuit.series(here, there, z * (at - done), v, phases), half))
         for end in (here, there):
             circuit.shunt(end, half)
         here, done = there, at
         if is_cut:
             assert cut is not None
             here = circuit.node(f"{line.name}.q", v)
-            circuit.gap(there, here, cut.open_phases, v)
+            circuit.gap(there, here, cut.open_phases, v, phases)
     (first, y_first), (last, y_last) = pieces[0], pieces[-1]
-    return LineEnd(first, 1.0, ends[0], y_first), LineEnd(last, -1.0, ends[1], y_last)
-
-
-def add_regulator(
-    circuit: Circuit, regulator: Regulator, factor: Sequence[float], v: float
-) -> list[int]:
-    """Three ideal autotransformers; returns the columns of the currents out of the to-side."""
-    current = circuit.columns(3, circuit.s_base / v)
-    for k in range(3):
-        ratio = (1 + regulator.taps[k] * regulator.step_pct / 100) * factor[k]
-        near, far = (regulator.from_bus, k), (regulator.to_bus, k)
-        circuit.leaves(near, current[k], ratio)
-        circuit.leaves(far, current[k], -1)
-        circuit.row(v, circuit.voltage(far, 1) + circuit.voltage(near, -ratio))
-    return current
+    return (
+        LineEnd(first, phases, 1.0, ends[0], y_first),
+        LineEnd(last, phases, -1.0, ends[1], y_last),
+    )
 
 
 def add_transformer(
@@ -234,7 +258,7 @@ def add_transformer(
 
 @dataclass(frozen=True, slots=True)
 class Windings:
-    """Three branches to which something is connected, and their nominal voltage."""
+    """Branches to which something is connected, and their nominal voltage."""
 
     plus: list[Terminal]
     minus: list[Terminal]
@@ -242,20 +266,49 @@ class Windings:
 
 
 def windings(node: str, kind: str, kv_ll: float) -> Windings:
-    """Wye or delta branches at a node whose line-to-line voltage is ``kv_ll``."""
+    """Three wye or delta branches at a node whose line-to-line voltage is ``kv_ll``."""
     plus, minus = _wye(node) if kind == "wye" else _delta(node)
     return Windings(plus, minus, kv_ll * 1000.0 / (float(np.sqrt(3.0)) if kind == "wye" else 1.0))
 
 
-def add_load(circuit: Circuit, load: Load, at: Windings, va: complex, exponent: float) -> None:
-    """Static part as group NAME, motors as group ``NAME.motor`` where there are any."""
-    y = np.conj(va) / 3 / at.v_nominal**2
+def branches(
+    node: str, kind: str, phases: str, branch_kv: float | None, v_phase: float
+) -> Windings:
+    """Those of a load or capacitor that stands on the feeder itself."""
+    at = rows(phases)
+    if kind == "wye":
+        plus: list[Terminal] = [(node, k) for k in at]
+        minus: list[Terminal] = [None] * len(at)
+        nominal = v_phase
+    else:
+        pairs = [(0, 1)] if len(at) == 2 else [(0, 1), (1, 2), (2, 0)]
+        plus = [(node, at[i]) for i, _ in pairs]
+        minus = [(node, at[j]) for _, j in pairs]
+        nominal = v_phase * float(np.sqrt(3.0))
+    return Windings(plus, minus, nominal if branch_kv is None else branch_kv * 1000.0)
+
+
+def add_load(circuit: Circuit, load: Load, at: Windings, scale: float, exponent: float) -> None:
+    """Static part as group NAME, motors as group ``NAME.motor`` where there are any.
+
+    An ``exponent`` of its own makes a load forget what else the file says of its law.
+    """
+    va = power_va(load.kw, load.power_factor) if load.kvar is None else load.kw * 1e3 + 0j
+    va = (va + 1000j * (load.kvar or 0.0)) * scale
+    count = len(at.plus)
+    y = np.conj(va) / count / at.v_nominal**2
+    limits = {name: getattr(load, name) for name in ("v_min_pu", "v_max_pu", "v_low_pu")}
+    law = Law(exponent=exponent, **limits)
+    if exponent == load.exponent:
+        law = Law(exponent=exponent, exponent_q=load.exponent_q, zip=load.zip, **limits)
+    static = (1 - load.motor_share) * np.eye(count, dtype=np.complex128)
     circuit.groups[load.name] = Group(
         plus=at.plus,
         minus=at.minus,
         v_nominal=at.v_nominal,
-        y_s=(1 - load.motor_share) * y * np.eye(3),
-        exponent=exponent,
+        y_s=y.real * static,
+        y_q_s=1j * y.imag * static,
+        law=law,
     )
     if load.motor_share:
         circuit.groups[f"{load.name}.motor"] = Group(
@@ -263,7 +316,7 @@ def add_load(circuit: Circuit, load: Load, at: Windings, va: complex, exponent: 
             minus=at.minus,
             v_nominal=at.v_nominal,
             y_s=machine_matrix(0, load.motor_share * y, 0),
-            exponent=exponent,
+            law=Law(exponent=exponent),
             machine=True,
             fixed_s=machine_matrix(0, 0, load.motor_share * y * load.motor_y2_y1),
         )
@@ -301,7 +354,7 @@ def add_der(
         minus=at.minus,
         v_nominal=at.v_nominal,
         y_s=machine_matrix(0, power, 0),
-        exponent=0.0,
+        law=Law(exponent=0.0),
         machine=True,
         fixed_s=runs * machine_matrix(y0, fixed, y2),
         fed_a=runs * fed * FORTESCUE[:, 1],
@@ -310,13 +363,13 @@ def add_der(
 
 def add_capacitor(circuit: Circuit, bank: Capacitor, at: Windings) -> None:
     """Group ``NAME.capacitor``, a constant admittance."""
-    y = 1j * bank.kvar * 1000.0 / 3 / at.v_nominal**2
+    y = 1j * bank.kvar * 1000.0 / len(at.plus) / at.v_nominal**2
     circuit.groups[f"{bank.name}.capacitor"] = Group(
         plus=at.plus,
         minus=at.minus,
         v_nominal=at.v_nominal,
-        y_s=y * np.eye(3, dtype=np.complex128),
-        exponent=2.0,
+        y_s=y * np.eye(len(at.plus), dtype=np.complex128),
+        law=Law(exponent=2.0),
     )
 
 

@@ -100,7 +100,7 @@ def happen(
     before, after = apply_event(at.network, at.steady, at.steady, own)
     first = solve(at.network, before)
     after = carried_over(at.network, before, first, after, own.der_factor)
-    then = solve(at.network, after, start=first.unit_v_pu)
+    then = solve(at.network, after, start=first.winding_v_pu)
     assert not (first.flags[0] | then.flags[0]) & NOT_CONVERGED
     return first, then
 

@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from oracles.dense import Event as DenseEvent
 from oracles.dense import Shunt
+from oracles.dense_inline import nominal_volts
 
 from openphase.model.events.base import Event, no_event
 from openphase.model.network import Network
 from openphase.model.parts import Feeder, Place
 
-__all__ = ["Happening", "dense_event", "random_happening"]
+__all__ = ["Happening", "dense_event", "phases_of", "random_happening"]
 
 Complex = NDArray[np.complex128]
 
@@ -39,20 +40,27 @@ def random_happening(rng: np.random.Generator, feeder: Feeder, network: Network)
     zero-sequence voltage in series, with which such a network would resonate.
     """
     event, what = no_event(network, 1), set()
+    volts = nominal_volts(feeder)
     if rng.random() < 0.9:
         event = replace(event, edge=np.array([_edge(rng, network)]), share=np.array([_share(rng)]))
-        event, found = _on_the_line(rng, network, event)
+        edge = network.pieces[int(event.edge[0])]
+        assert edge is not None
+        line = next(line for line in feeder.lines if line.name == edge.line)
+        event, found = _on_the_line(rng, volts[line.from_bus], event)
+        event = _on_phases(event, line.phases)
         what |= found
-    v = network.tree.v_nominal_v
     if rng.random() < 0.25:
         what.add("far")
-        before, after = _steps(rng, v) if rng.random() < 0.6 else (_none(), _fault(rng))
         node = np.array([rng.integers(len(network.nodes))])
+        where, there = _whereabouts(feeder, network.nodes[int(node[0])])
+        v = volts[where]
+        before, after = _steps(rng, v) if rng.random() < 0.6 else (_none(), _fault(rng))
         event = replace(event, far_node=node, far_before_s=before, far_after_s=after)
         if rng.random() < 0.4:
             what.add("far, between")
             before, after = _steps(rng, v) if rng.random() < 0.6 else (_none(), _fault(rng))
             event = replace(event, far_between_before_s=before, far_between_after_s=after)
+        event = _far_on_phases(event, there)
     if rng.random() < 0.2:
         what.add("emf")
         event = replace(event, emf_factor=np.array([rng.uniform(0.9, 1.05)]))
@@ -72,11 +80,73 @@ def random_happening(rng: np.random.Generator, feeder: Feeder, network: Network)
     return Happening(event=event, what=frozenset(what))
 
 
+def _whereabouts(feeder: Feeder, node: str) -> tuple[str, str]:
+    """A bus of a node's voltage, and the phases that are there."""
+    name, _, what = node.partition(":")
+    if what == "open":
+        point = next(point for point in feeder.points if point.name == name)
+        line = next(line for line in feeder.lines if line.name == point.line)
+        return line.from_bus, line.phases
+    if what:
+        line = next(line for line in feeder.lines if line.name == name)
+        return line.from_bus, line.phases
+    return node, phases_of(feeder, node)
+
+
+def phases_of(feeder: Feeder, bus: str) -> str:
+    """The conductors that reach a bus, by what is connected there."""
+    found = "abc" if bus == feeder.source.bus else ""
+    for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
+        if bus in (part.from_bus, part.to_bus):
+            found += part.phases
+    for regulator in feeder.regulators:
+        if regulator.reference != "earth" and bus in (regulator.from_bus, regulator.to_bus):
+            found += "abc" if regulator.reference == "next" else regulator.reference
+    for unit in feeder.inline_transformers:
+        found += unit.phases if bus == unit.from_bus else ""
+        found += unit.to_phases if bus == unit.to_bus else ""
+    return "".join(sorted(set(found) & set("abc")))
+
+
+def _held(values: Complex, phases: str, *, between: bool = False) -> Complex:
+    """(3, 1) without what hangs on phases that are not there."""
+    there = np.array([phase in phases for phase in "abc"])
+    if between:
+        there = there & np.roll(there, -1)
+    return np.where(there[:, None], values, 0.0).astype(np.complex128)
+
+
+def _on_phases(event: Event, phases: str) -> Event:
+    """What stands on a line, on the phases that it has."""
+    mask = sum(1 << k for k in range(3) if "abc"[k] in phases)
+    return replace(
+        event,
+        open_before=event.open_before & mask,
+        open_after=event.open_after & mask,
+        earth_before_s=_held(event.earth_before_s, phases),
+        earth_after_s=_held(event.earth_after_s, phases),
+        between_before_s=_held(event.between_before_s, phases, between=True),
+        between_after_s=_held(event.between_after_s, phases, between=True),
+        fallen_after_s=_held(event.fallen_after_s, phases),
+    )
+
+
+def _far_on_phases(event: Event, phases: str) -> Event:
+    """The same at the second place."""
+    return replace(
+        event,
+        far_before_s=_held(event.far_before_s, phases),
+        far_after_s=_held(event.far_after_s, phases),
+        far_between_before_s=_held(event.far_between_before_s, phases, between=True),
+        far_between_after_s=_held(event.far_between_after_s, phases, between=True),
+    )
+
+
 def _edge(rng: np.random.Generator, network: Network) -> int:
     """A piece of line; where there is a loop, often one of it, and often its chord."""
     lines = np.flatnonzero(network.length_km > 0)
     chosen = lines
-    if network.has_chord and rng.random() < 0.5:
+    if network.chords and rng.random() < 0.5:
         chord = len(network.nodes)
         ring = [k for k in lines if k == chord or network.tree.in_loop[k]]
         chosen = np.array([chord] if rng.random() < 0.4 else ring)
@@ -87,9 +157,7 @@ def _share(rng: np.random.Generator) -> float:
     return float(rng.choice([0.0, 1.0, rng.uniform(0.02, 0.98)], p=[0.12, 0.12, 0.76]))
 
 
-def _on_the_line(
-    rng: np.random.Generator, network: Network, event: Event
-) -> tuple[Event, set[str]]:
+def _on_the_line(rng: np.random.Generator, v: float, event: Event) -> tuple[Event, set[str]]:
     what = set()
     if rng.random() < 0.65:
         after = int(rng.choice([1, 2, 4, 3, 5, 6, 7], p=[0.2, 0.2, 0.2, 0.1, 0.1, 0.1, 0.1]))
@@ -105,7 +173,7 @@ def _on_the_line(
     kind = rng.random()
     if kind < 0.3:
         what.add("step")
-        before_s, after_s = _steps(rng, network.tree.v_nominal_v)
+        before_s, after_s = _steps(rng, v)
         exponent = float(rng.choice([0.0, 1.0, 2.0, rng.uniform(0, 2)]))
         event = replace(
             event,
@@ -132,8 +200,8 @@ def _none() -> Complex:
 
 
 def _steps(rng: np.random.Generator, v: float) -> tuple[Complex, Complex]:
-    """Loads of up to 100 kW a phase before and after; some phases have none."""
-    kw = rng.uniform(0, 100, (2, 3, 1)) * rng.integers(0, 2, (2, 3, 1))
+    """Loads of up to 100 kW a phase (of low voltage 10) before and after; some have none."""
+    kw = rng.uniform(0, 100 if v > 1000 else 10, (2, 3, 1)) * rng.integers(0, 2, (2, 3, 1))
     y = (kw * 1000 * (1 - 0.3j) / v**2).astype(np.complex128)
     return y[0], y[1]
 

@@ -9,12 +9,12 @@ from typing import Any, TypeAlias
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from oracles.comparison import TOLERANCE, Case, Outcome, compare
+from oracles.comparison import TOLERANCE, Case, Outcome, compare, outcomes
 from oracles.random_elements import FOUR_WIRE, THREE_WIRE, random_full_feeder
 from oracles.random_happenings import Happening, random_happening
 
 from openphase.model.errors import InputError
-from openphase.model.events.base import apply_event, no_event
+from openphase.model.events.base import no_event
 from openphase.model.machine_state import carried_over, machine_state
 from openphase.model.machines import DER_MODELS
 from openphase.model.network import CONNECTIONS, compile_network
@@ -67,23 +67,6 @@ def _transferred(
     if not points or rng.random() < 0.6:
         return frozenset()
     return frozenset({points[int(rng.integers(len(points)))]})
-
-
-def outcomes(case: Case) -> list[Outcome]:
-    """Before the event, and after it."""
-    network, event = case.network, case.happening.event
-    steady = steady_state(network)
-    first, second = apply_event(network, steady, steady, event)
-    answer = solve(network, first)
-    state: dict[str, Any] = {"opened": case.opened}
-    before, oracle = compare(case, answer, case.event(after=False), None, **state)
-    if before.how not in ("agree", "elsewhere"):
-        return [before]
-    second = carried_over(network, first, answer, second, event.der_factor)
-    answer = solve(network, second, start=answer.unit_v_pu)
-    scale = {name: float(event.load_factor[n, 0]) for n, name in enumerate(network.loads)}
-    state |= {"before": oracle, "load_scale": scale}
-    return [before, compare(case, answer, case.event(after=True), oracle, **state)[0]]
 
 
 @pytest.fixture(scope="module")

@@ -122,7 +122,7 @@ def test_sides_are_those_of_the_taken_apart_feeder(
     scenarios, found = seen(wires, group, drawn)
     group = case.study.setting_groups()[case.group.index]
     closed = [s.name for s in case.feeder.switches if s.closed]
-    looped = case.network.has_chord  # sides of a closed loop are those of the normal state
+    looped = case.network.chords  # sides of a closed loop are those of the normal state
     own_state = in_state(
         case.feeder,
         closed if looped or group.closed is None else group.closed,

@@ -59,8 +59,8 @@ def test_cold_load_is_taken_beyond_the_place_only(
     request: pytest.FixtureRequest, kind: str
 ) -> None:
     site: Site = request.getfixturevalue(kind)
-    event, tree = draw("reclosing", site, N), site.network.tree
-    beyond = fed_through(site.network, event.edge, tree.unit_node[tree.load_unit])
+    event = draw("reclosing", site, N)
+    beyond = fed_through(site.network, event.edge, site.network.load_node)
     assert beyond.any()
     assert not beyond.all()
     assert (event.load_factor[~beyond] == 1.0).all()

@@ -300,14 +300,11 @@ def test_before_an_energisation_all_beyond_is_dead_and_draws_nothing(site: Site)
     """As if neither the loads nor the DER beyond were there, connected DER elsewhere included."""
     event = draw("energisation", site, 30)
     before, _ = site.answers(event)
-    tree = site.network.tree
     for s in range(30):
         edge = int(event.edge[s])
         beyond = site.network.below(edge)
         np.testing.assert_array_equal(before.v[beyond, :, s], 0.0)
-        gone = {
-            site.network.loads[n] for n in np.flatnonzero(beyond[tree.unit_node[tree.load_unit]])
-        }
+        gone = {site.network.loads[n] for n in np.flatnonzero(beyond[site.network.load_node])}
         lost = zip(site.feeder.ders, event.der_factor[:, s] == 0.0, strict=True)
         less = replace(
             site.feeder,

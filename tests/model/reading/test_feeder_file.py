@@ -310,6 +310,9 @@ def test_one_fault(old: str, new: str, message: str) -> None:
     assert faults_of(changed(old, new)) == [message]
 
 
+BETWEEN = " stands between two buses, in [[inline_transformers]]"
+
+
 @pytest.mark.parametrize(
     ("found", "what"),
     [
@@ -318,15 +321,15 @@ def test_one_fault(old: str, new: str, message: str) -> None:
         ("YNd1", "a vector group, written Yg/D whatever its clock"),
         ("Yd5", "a vector group, written Y/D whatever its clock"),
         ("dd0", "a vector group, written D/D whatever its clock"),
-        ("Yg/Y", "a low-voltage wye winding without a grounded neutral, which has no model"),
-        ("Δ/Y", "a low-voltage wye winding without a grounded neutral, which has no model"),
-        ("Yy0", "a low-voltage wye winding without a grounded neutral, which has no model"),
-        ("Y/Yg", "an ungrounded wye winding above a grounded one, whose neutral has no model"),
+        ("Yg/Y", "a low-voltage wye winding without a grounded neutral, which" + BETWEEN),
+        ("Δ/Y", "a low-voltage wye winding without a grounded neutral, which" + BETWEEN),
+        ("Yy0", "a low-voltage wye winding without a grounded neutral, which" + BETWEEN),
+        ("Y/Yg", "an ungrounded wye winding above a grounded one, which" + BETWEEN),
         ("Zy", "a zigzag winding, which has no model"),
-        ("V/V", "an open bank of two units, which has no model"),
-        ("open-delta", "an open bank of two units, which has no model"),
-        ("single-phase", "a single-phase unit, which has no model: banks have three phases"),
-        ("SWER", "a single-phase unit, which has no model: banks have three phases"),
+        ("V/V", "an open bank of two units, which stand between two buses, in [[inline_transformers]]"),
+        ("open-delta", "an open bank of two units, which stand between two buses, in [[inline_transformers]]"),
+        ("single-phase", "a single-phase unit, which" + BETWEEN),
+        ("SWER", "a single-phase unit, which" + BETWEEN),
         ("Yg/Yg/D", "a three-winding unit, which has no model"),
     ],
 )

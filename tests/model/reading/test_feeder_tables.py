@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from openphase.model import Feeder, InputError, dump_feeder, feeder_from_toml, read_feeder
-from openphase.model.reading.csv_table import columns_of, parse_csv
+from openphase.model.reading.csv_table import parse_csv, ways_of
 from openphase.model.reading.feeder_fields import CSV_TABLES, ROWS
 from openphase.model.reading.toml_file import toml_rows
 
@@ -36,6 +36,27 @@ length_km = 2
 z1_ohm_per_km = { mag = 0.4, deg = 60.0 }
 z0_ohm_per_km = { mag = 1.0, deg = 70.0 }
 c1_nf_per_km = 9.5
+
+[[lines]]
+name = "twig"
+from = "B"
+to = "E"
+length_km = 1
+z1_ohm_per_km = { mag = 0.4, deg = 60.0 }
+z0_ohm_per_km = { mag = 1.0, deg = 70.0 }
+phases = "ca"
+
+[[inline_transformers]]
+name = "pole"
+from = "E"
+to = "yard"
+connection = "single"
+rating_kva = 25
+kv_from = 12.47
+kv_to = 0.24
+leakage_pu = { mag = 0.02, deg = 60.0 }
+phases = "ac"
+to_phases = "a"
 
 [[transformers]]
 name = "T1"
@@ -66,6 +87,14 @@ at = 1
 connection = "delta"
 kw = 12.5
 motor_share = 0.5
+
+[[loads]]
+name = "hut"
+bus = "yard"
+kw = 3
+kvar = -1.5
+phases = "a"
+zip = [0.5, 0.25, 0.25, 1.5, -0.5, 0]
 
 [[ders]]
 name = "pv"
@@ -99,19 +128,27 @@ voltage_side = "bus"
 [[sections]]
 local = "P1"
 remote = "P2"
+
+[[coordinates]]
+bus = "SUB"
+x = -3
+y = 0.5
 """
 
 
 def as_csv(rows: list[dict[str, object]], table: str) -> str:
     """Return a table of the TOML file as CSV, all columns, cells as people write them."""
     out = io.StringIO()
-    writer = csv.DictWriter(out, list(columns_of(ROWS[table])), lineterminator="\n")
+    columns = [column for own in ROWS[table] for column in ways_of(own)[0]]
+    writer = csv.DictWriter(out, columns, lineterminator="\n")
     writer.writeheader()
     for row in rows:
         cells: dict[str, object] = {}
         for key, value in row.items():
             if isinstance(value, dict):
                 cells |= {f"{key}.{part}": number for part, number in value.items()}
+            elif isinstance(value, list):
+                cells |= {f"{key}.{n}": number for n, number in enumerate(value, start=1)}
             else:
                 cells[key] = str(value).upper() if isinstance(value, bool) else value
         writer.writerow(cells)

@@ -21,6 +21,7 @@ from openphase.model.distributions import (
     Integers,
     Lognormal,
     Normal,
+    Quantiles,
     Triangular,
     Uniform,
     Values,
@@ -59,6 +60,7 @@ from openphase.studies.spec.study_file import (
     Instruments,
     LoadDraw,
     LoadStepDraw,
+    MeasuredLoad,
     MotorDraw,
     NetworkState,
     OpenPhaseDraw,
@@ -85,6 +87,10 @@ FULL = Study(
         each=Fixed(value=1.0),
         exponent=Triangular(low=0.5, mode=1.0, high=1.5),
         exponent_spread=0.0,
+    ),
+    measured=(
+        MeasuredLoad(point="R2", level=Quantiles(values=(0.1, 0.1, 0.7, 1.0))),
+        MeasuredLoad(point="R5", level=Uniform(low=0.2, high=1.0)),
     ),
     motors=MotorDraw(share=Uniform(low=0.1, high=0.5), y2_y1=Fixed(value=6.0)),
     transformers=TransformerDraw(
@@ -196,6 +202,7 @@ def test_the_full_study_leaves_no_field_at_its_default() -> None:
                 values = [getattr(part_of(s, table), field.name) for s in (FULL, Study())]
                 assert values[0] != values[1], (table, field.name)
     assert FULL.groups
+    assert FULL.measured
     assert FULL.correlations
 
 

@@ -14,6 +14,7 @@ from openphase.model.distributions import (
     Integers,
     Lognormal,
     Normal,
+    Quantiles,
     Triangular,
     Uniform,
     Values,
@@ -29,6 +30,7 @@ from openphase.studies.spec.fields import (
     DOCUMENT,
     EVENTS,
     GROUPS,
+    MEASURED,
     STATES,
     STEPS,
     TABLES,
@@ -57,6 +59,7 @@ def study(*lines: str) -> Study:
         ("Top level", DOCUMENT),
         ("`[events]`", EVENTS),
         ("`[[groups]]`", GROUPS),
+        ("`[[measured]]`", MEASURED),
         ("`[[correlations]]`", CORRELATIONS),
         ("Steps", STEPS),
         ("States", STATES),
@@ -112,7 +115,7 @@ def test_what_the_document_says_of_distributions_and_quantities() -> None:
     said = re.findall(r"^  \| (`.*`) \|", text, re.MULTILINE)
     written = [piece for cell in said for piece in re.findall(r"`([^`]*)`", cell)]
     kinds = {type(study("[loads]", f"level = {piece}").loads.level) for piece in written}
-    assert kinds == {Fixed, Uniform, Normal, Lognormal, Triangular, Integers, Values}
+    assert kinds == {Fixed, Uniform, Normal, Lognormal, Triangular, Integers, Quantiles, Values}
     for name in (*SCALARS, *WIRING_KINDS):
         assert f"`{name}`" in text
 

@@ -114,7 +114,7 @@ def paper() -> Feeder:
         (
             ("[loads]", "level = { norml = [1, 1] }"),
             "3: loads: level must have just one of the keys uniform, normal, lognormal,"
-            " triangular, integers, values, got { norml = [1, 1] }",
+            " triangular, integers, quantiles, values, got { norml = [1, 1] }",
         ),
         (
             ("[loads]", "level = { normal = [1, 1] }"),
@@ -123,7 +123,7 @@ def paper() -> Feeder:
         (
             ("[loads]", "level = { uniform = [0, 1], normal = [1, 1] }"),
             "3: loads: level must have just one of the keys uniform, normal, lognormal,"
-            " triangular, integers, values, got { uniform = [0, 1], normal = [1, 1] }",
+            " triangular, integers, quantiles, values, got { uniform = [0, 1], normal = [1, 1] }",
         ),
         (
             ("[loads]", "level = { normal = [1], within = [0, 1] }"),

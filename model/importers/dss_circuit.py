@@ -1,0 +1,304 @@
+"""Reads a compiled OpenDSS circuit into plain records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .dss_engine import Engine, Props, rows_of
+from .dss_records import (
+    End,
+    Matrix,
+    OtherElement,
+    RawCapacitor,
+    RawCircuit,
+    RawGuard,
+    RawLine,
+    RawLoad,
+    RawPlant,
+    RawReactor,
+    RawSource,
+    RawTapControl,
+    RawTransformer,
+    Winding,
+)
+
+__all__ = ["read_circuit"]
+
+_METRES = {
+    "mi": 1609.344,
+    "kft": 304.8,
+    "km": 1000.0,
+    "m": 1.0,
+    "ft": 0.3048,
+    "in": 0.0254,
+    "cm": 0.01,
+    "mm": 0.001,
+}
+_GUARDS = ("fuse", "recloser", "relay", "swtcontrol")
+_PLANTS = ("generator", "pvsystem", "storage")
+_UNREAD = (
+    "isource",
+    "vccs",
+    "fault",
+    "upfc",
+    "espvlcontrol",
+    "indmach012",
+    "gicsource",
+    "autotrans",
+    "gicline",
+    "gictransformer",
+    "vsconverter",
+)
+
+
+def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) -> RawCircuit:
+    """Return what the engine's circuit is made of, disabled elements left out."""
+    solution = engine.circuit.Solution
+    return RawCircuit(
+        name=str(engine.circuit.Name),
+        frequency_hz=float(solution.Frequency),
+        load_mult=float(solution.LoadMult),
+        sources=tuple(_source(row) for row in rows_of(engine, "vsource")),
+        lines=_lines(engine),
+        transformers=tuple(_transformer(row) for row in rows_of(engine, "transformer")),
+        loads=tuple(_load(row) for row in rows_of(engine, "load")),
+        capacitors=tuple(_capacitor(row) for row in rows_of(engine, "capacitor")),
+        reactors=tuple(_reactor(engine, row) for row in rows_of(engine, "reactor")),
+        plants=tuple(_plant(kind, row) for kind in _PLANTS for row in rows_of(engine, kind)),
+        guards=tuple(_guard(kind, row) for kind in _GUARDS for row in rows_of(engine, kind)),
+        tap_controls=tuple(_tap_control(row) for row in rows_of(engine, "regcontrol")),
+        others=tuple(_other(kind, row) for kind in _UNREAD for row in rows_of(engine, kind)),
+        disabled=sum(
+            len(rows_of(engine, kind, disabled=True)) - len(rows_of(engine, kind))
+            for kind in ("line", "transformer", "load", "capacitor", "reactor", *_PLANTS)
+        ),
+        coordinates=tuple((bus, x, y) for bus, (x, y) in coordinates.items()),
+    )
+
+
+def end_of(text: str, conductors: int, phases: int) -> End:
+    """Return the terminal that ``bus.1.2.3`` means: phases by default, then earth.
+
+    Examples
+    --------
+    >>> end_of("671.3.1", 2, 1)
+    End(bus='671', nodes=(3, 1))
+    >>> end_of("B", 4, 3)
+    End(bus='b', nodes=(1, 2, 3, 0))
+    """
+    bus, *given = text.strip().lower().split(".")
+    nodes = [int(node) for node in given if node.strip()][:conductors]
+    nodes += [n + 1 if n < phases else 0 for n in range(len(nodes), conductors)]
+    return End(bus=bus, nodes=tuple(nodes))
+
+
+def _name(row: Props) -> str:
+    return str(row["Name"] if "Name" in row else row["name"]).lower()
+
+
+def _complex(pair: Sequence[float]) -> complex:
+    return complex(pair[0], pair[1])
+
+
+def _matrix(rows: Any) -> Matrix:
+    return tuple(tuple(float(value) for value in row) for row in rows)
+
+
+def _source(row: Props) -> RawSource:
+    phases = int(row["phases"])
+    ideal = str(row["model"]).lower() == "ideal"
+    ohms = float(row["basekv"]) ** 2 / float(row["basemva"])
+    z1, z2, z0 = (_complex(row[key]) for key in ("z1", "z2", "z0"))
+    if ideal:
+        z1 = z2 = z0 = _complex(row["puzideal"]) * ohms
+    return RawSource(
+        name=_name(row),
+        end=end_of(row["bus1"], phases, phases),
+        phases=phases,
+        kv_ll=float(row["basekv"]),
+        pu=float(row["pu"]),
+        angle_deg=float(row["angle"]),
+        z1_ohm=z1,
+        z2_ohm=z2,
+        z0_ohm=z0,
+    )
+
+
+def _lines(engine: Engine) -> tuple[RawLine, ...]:
+    units = {_name(row): row.get("units") for row in rows_of(engine, "linecode", disabled=True)}
+    return tuple(_line(engine, row, units) for row in rows_of(engine, "line"))
+
+
+def _line(engine: Engine, row: Props, code_units: dict[str, Any]) -> RawLine:
+    phases = int(row["phases"])
+    code = row.get("linecode")
+    unit = str(row["units"]).lower()
+    if unit not in _METRES and code:
+        # a length without a unit is in that of its code
+        unit = str(code_units.get(str(code).lower())).lower()
+    build = code or row.get("geometry") or row.get("spacing")
+    x = np.array(row["xmatrix"], np.float64)
+    base = float(row["basefreq"])
+    frequency = float(engine.circuit.Solution.Frequency)
+    return RawLine(
+        name=_name(row),
+        ends=(end_of(row["bus1"], phases, phases), end_of(row["bus2"], phases, phases)),
+        r_ohm=_matrix(row["rmatrix"]),
+        x_ohm=_matrix((x * (frequency / base)).tolist() if base > 0 else row["xmatrix"]),
+        c_nf=_matrix(row["cmatrix"]),
+        length=float(row["length"]),
+        unit_m=_METRES.get(unit),
+        build=str(build).lower() if build else None,
+        is_switch=bool(row["switch"]),
+        opened=_opened(engine, f"line.{_name(row)}", phases),
+    )
+
+
+def _opened(engine: Engine, element: str, phases: int) -> tuple[tuple[bool, ...], tuple[bool, ...]]:
+    engine.circuit.SetActiveElement(element)
+    active = engine.circuit.ActiveCktElement
+    near, far = (
+        tuple(bool(active.IsOpen(terminal, n + 1)) for n in range(phases)) for terminal in (1, 2)
+    )
+    return near, far
+
+
+def _transformer(row: Props) -> RawTransformer:
+    phases = int(row["phases"])
+    return RawTransformer(
+        name=_name(row),
+        phases=phases,
+        windings=tuple(_winding(row, n, phases) for n in range(len(row["kvs"]))),
+        x_pct=(float(row["xhl"]), float(row["xht"]), float(row["xlt"])),
+        imag_pct=float(row["%imag"]),
+        noload_pct=float(row["%noloadloss"]),
+        euro=str(row["leadlag"]).lower() in {"lead", "euro"},
+        bank=str(row["bank"]).lower(),
+    )
+
+
+def _winding(row: Props, n: int, phases: int) -> Winding:
+    r_neutral = float(row["rneut"][n])
+    steps = max(int(row["numtaps"][n]), 1)
+    return Winding(
+        end=end_of(row["buses"][n], phases + 1, phases),
+        delta=str(row["conns"][n]).lower().startswith("d"),
+        kv=float(row["kvs"][n]),
+        kva=float(row["kvas"][n]),
+        r_pct=float(row["%rs"][n]),
+        tap=float(row["taps"][n]),
+        tap_step=(float(row["maxtap"][n]) - float(row["mintap"][n])) / steps,
+        most_taps=max(steps // 2, 1),
+        neutral_ohm=complex(r_neutral, float(row["xneut"][n])) if r_neutral >= 0.0 else None,
+    )
+
+
+def _load(row: Props) -> RawLoad:
+    phases = int(row["phases"])
+    delta = str(row["conn"]).lower().startswith(("d", "l"))
+    conductors = phases if delta and phases > 2 else phases + 1
+    return RawLoad(
+        name=_name(row),
+        end=end_of(row["bus1"], conductors, phases),
+        phases=phases,
+        delta=delta,
+        kv=float(row["kv"]),
+        kw=float(row["kw"]),
+        kvar=float(row["kvar"]),
+        model=int(row["model"]),
+        cvr=(float(row["cvrwatts"]), float(row["cvrvars"])),
+        zipv=tuple(float(value) for value in row["zipv"]),
+        v_min_pu=float(row["vminpu"]),
+        v_max_pu=float(row["vmaxpu"]),
+        v_low_pu=float(row["vlowpu"]),
+        fixed=str(row["status"]).lower() != "variable",
+    )
+
+
+def _capacitor(row: Props) -> RawCapacitor:
+    phases = int(row["phases"])
+    delta = str(row["conn"]).lower().startswith(("d", "l"))
+    return RawCapacitor(
+        name=_name(row),
+        end=end_of(row["bus1"], phases, phases),
+        far=end_of(row["bus2"] or "", phases, phases),
+        phases=phases,
+        delta=delta,
+        kv=float(row["kv"]),
+        kvar=tuple(float(value) for value in row["kvar"]),
+        states=tuple(int(value) for value in row["states"]),
+        damped=any(float(value) != 0.0 for key in ("r", "xl") for value in row[key]),
+    )
+
+
+def _reactor(engine: Engine, row: Props) -> RawReactor:
+    """Read a reactor, its impedance out of its own admittance matrix: that covers every way."""
+    engine.circuit.SetActiveElement(f"reactor.{_name(row)}")
+    flat = np.asarray(engine.circuit.ActiveCktElement.Yprim, np.float64)
+    if flat.size < 8:
+        engine.circuit.Solution.BuildYMatrix(0, 1)
+        engine.circuit.SetActiveElement(f"reactor.{_name(row)}")
+        flat = np.asarray(engine.circuit.ActiveCktElement.Yprim, np.float64)
+    y = flat[0::2] + 1j * flat[1::2]
+    size = math.isqrt(y.size)
+    phases = int(row["phases"])
+    delta = str(row["conn"]).lower().startswith(("d", "l"))
+    own = y.reshape(size, size)[:phases, :phases]
+    # a delta's matrix has no inverse; its branches are the same in all of them
+    z = np.diag(np.full(phases, -1.0 / own[0, 1])) if delta and phases > 1 else np.linalg.inv(own)
+    return RawReactor(
+        name=_name(row),
+        ends=(
+            end_of(row["bus1"], phases, phases),
+            end_of(row["bus2"] or "", phases, phases),
+        ),
+        delta=delta,
+        r_ohm=_matrix(z.real),
+        x_ohm=_matrix(z.imag),
+    )
+
+
+def _plant(kind: str, row: Props) -> RawPlant:
+    kw, kvar = float(row["kw"]) if "kw" in row else 0.0, float(row["kvar"])
+    if kind == "pvsystem":
+        made = float(row["pmpp"]) * float(row["irradiance"]) * float(row["%pmpp"]) / 100.0
+        kw = min(made, float(row["kva"]))
+    phases = int(row["phases"])
+    return RawPlant(
+        kind=kind,
+        name=_name(row),
+        end=end_of(row["bus1"], phases + 1, phases),
+        phases=phases,
+        kw=kw,
+        kvar=kvar,
+        model=int(row["model"]),
+    )
+
+
+def _guard(kind: str, row: Props) -> RawGuard:
+    # a relay or recloser that names nothing to switch, switches what it watches
+    return RawGuard(
+        kind=kind,
+        name=_name(row),
+        element=str(row["switchedobj"] or row.get("monitoredobj") or "").lower(),
+        terminal=int(row["switchedterm"]),
+    )
+
+
+def _tap_control(row: Props) -> RawTapControl:
+    return RawTapControl(
+        name=_name(row),
+        transformer=str(row["transformer"]).lower().rpartition(".")[2],
+        winding=int(row["tapwinding"]),
+    )
+
+
+def _other(kind: str, row: Props) -> OtherElement:
+    phases = int(row.get("phases") or 3)
+    texts = [row[key] for key in ("bus1", "bus2") if row.get(key)] or list(row.get("buses") or ())
+    ends = tuple(end_of(text, phases, phases) for text in texts)
+    return OtherElement(kind=kind, name=_name(row), ends=ends)

@@ -1,0 +1,108 @@
+"""The OpenDSS engine, handed one safe command at a time, and asked for what it holds."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import Fault, InputError, OpenPhaseError
+from .dss_script import Command
+
+__all__ = ["Engine", "Props", "rows_of", "solved_volts", "start"]
+
+Props = Mapping[str, Any]
+
+_FULL, _NO_DISABLED, _LOWER = 1, 32, 128
+"""Options of the engine's JSON: every property, enabled elements alone, keys in lower case."""
+
+_MOST_FAULTS = 20
+"""After so many commands that failed the rest would fail for want of them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Engine:
+    """An engine of its own with one compiled circuit in it."""
+
+    context: Any
+    circuit: Any
+    source: str
+
+
+def start(commands: Iterable[Command], source: str) -> Engine:
+    """Compile a circuit from its commands.
+
+    Raises
+    ------
+    InputError
+        With what the engine said to each command that it did not take.
+    OpenPhaseError
+        If the extra is not installed.
+    """
+    try:
+        dss = importlib.import_module("dss")
+    except ImportError as error:
+        raise OpenPhaseError(
+            f"{source}: an OpenDSS file needs the extra: pip install 'openphase[opendss]'"
+        ) from error
+    context = dss.DSS.NewContext()
+    for option in ("AllowForms", "AllowEditor", "AllowChangeDir"):
+        setattr(context, option, False)
+    faults: list[Fault] = []
+    for command in commands:
+        try:
+            context.Text.Command = command.text
+        except dss.DSSException as error:
+            said = " ".join(str(error.args[-1]).split())[:300]
+            where, rule = command.text[:80], f"is not taken by OpenDSS: {said}"
+            faults.append(Fault(source=command.file, line=command.line, where=where, wanted=rule))
+            if len(faults) >= _MOST_FAULTS:
+                break
+    if not faults and not context.NumCircuits:
+        faults.append(
+            Fault(source=source, line=None, where="", wanted="must make a circuit (New Circuit…)")
+        )
+    if faults:
+        raise InputError(faults)
+    return Engine(context=context, circuit=context.ActiveCircuit, source=source)
+
+
+def rows_of(engine: Engine, kind: str, *, disabled: bool = False) -> list[Props]:
+    """Return every property of each enabled element of a class, keys in lower case."""
+    if engine.circuit.SetActiveClass(kind) < 0:
+        return []
+    options = _FULL | _LOWER | (0 if disabled else _NO_DISABLED)
+    text = engine.circuit.ActiveClass.ToJSON(options)
+    found = json.loads(text) if text else []
+    return found if isinstance(found, list) else []
+
+
+def solved_volts(
+    engine: Engine, *, mode: str, disabled: Iterable[str] = ()
+) -> tuple[dict[tuple[str, int], complex], bool]:
+    """Let the engine solve, its controls off, and return each node's voltage to earth.
+
+    Parameters
+    ----------
+    mode
+        ``snap`` with the loads' own laws, ``direct`` with nominal admittances.
+    disabled
+        Elements that were left out of the import.
+    """
+    text = engine.context.Text
+    for element in disabled:
+        text.Command = f'Disable "{element}"'
+    for option in ("controlmode=off", "tolerance=1e-9", "maxiterations=2000", f"mode={mode}"):
+        text.Command = f"Set {option}"
+    engine.circuit.Solution.Solve()
+    flat = np.asarray(engine.circuit.AllBusVolts, np.float64)
+    volts = flat[0::2] + 1j * flat[1::2]
+    nodes: dict[tuple[str, int], complex] = {}
+    for name, value in zip(engine.circuit.AllNodeNames, volts, strict=True):
+        bus, _, node = name.rpartition(".")
+        nodes[(bus.lower(), int(node))] = complex(value)
+    return nodes, bool(engine.circuit.Solution.Converged)

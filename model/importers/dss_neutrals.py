@@ -1,0 +1,60 @@
+"""What stands between a neutral node of an OpenDSS circuit and earth."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+from .dss_live import Node
+from .dss_records import RawCircuit, Winding
+
+__all__ = ["Neutrals", "neutral_ohm", "neutrals_of"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Neutrals:
+    """By neutral node: what earths it, and what else joins it."""
+
+    earthing: dict[Node, list[complex]] = field(default_factory=dict)  #: siemens
+    conductors: frozenset[Node] = frozenset()  #: joined by a line's neutral conductor
+    shared: frozenset[Node] = frozenset()  #: of more than one transformer winding
+    reactors: frozenset[str] = frozenset()  #: names of the reactors that earth a neutral
+
+
+def neutrals_of(circuit: RawCircuit) -> Neutrals:
+    """Collect what the circuit does with nodes that are no phase."""
+    earthing: defaultdict[Node, list[complex]] = defaultdict(list)
+    reactors = set()
+    for reactor in circuit.reactors:
+        near, far = reactor.ends
+        if len(near.nodes) == 1 and far.nodes == (0,) and near.nodes[0] > 3:
+            z = complex(reactor.r_ohm[0][0], reactor.x_ohm[0][0])
+            earthing[(near.bus, near.nodes[0])].append(1.0 / z)
+            reactors.add(reactor.name)
+    uses: defaultdict[Node, int] = defaultdict(int)
+    for unit in circuit.transformers:
+        for winding in unit.windings:
+            if not winding.delta:
+                uses[(winding.end.bus, winding.end.nodes[unit.phases])] += 1
+    return Neutrals(
+        earthing=dict(earthing),
+        conductors=frozenset(
+            (end.bus, node) for line in circuit.lines for end in line.ends for node in end.nodes
+        ),
+        shared=frozenset(node for node, count in uses.items() if count > 1),
+        reactors=frozenset(reactors),
+    )
+
+
+def neutral_ohm(winding: Winding, phases: int, neutrals: Neutrals) -> complex | None:
+    """Return the ohms between a wye's neutral and earth, None where it is not earthed."""
+    node = (winding.end.bus, winding.end.nodes[phases])
+    if node[1] == 0 or node in neutrals.conductors:
+        return 0j
+    siemens = list(neutrals.earthing.get(node, ()))
+    if winding.neutral_ohm is not None:
+        if winding.neutral_ohm == 0:
+            return 0j
+        siemens.append(1.0 / winding.neutral_ohm)
+    total = sum(siemens)
+    return 1.0 / total if total else None

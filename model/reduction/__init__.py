@@ -1,0 +1,1 @@
+"""Fewer buses: laterals and low-voltage networks folded, a named approximation."""

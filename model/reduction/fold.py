@@ -1,0 +1,274 @@
+"""Laterals and low-voltage networks folded to loads at one bus each, every load with its name."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..buses import bus_volts
+from ..parts import Feeder, InlineTransformer, Line, Load
+from .equivalent import Equivalent, Kind, SeenLoad, equivalent_of, seen_through
+from .foldable import fold_roots, kept_by_default
+from .folded_part import FoldedPart, Seen, folded_part, seen_from_roots
+from .rebuild import Stub, free_name, moved_load, names_in, stub_of
+
+__all__ = ["LEVEL", "WITHIN", "Folded", "FoldedRoot", "fold"]
+
+Complex = NDArray[np.complex128]
+
+LEVEL = 0.625
+"""Level of the loads at which the fold is exact: the mean of what a study draws by default."""
+ENDS = (0.25, 1.0)
+"""Levels at which the kinds of equivalents are compared."""
+WITHIN = 1e-3
+"""A root gets an equivalent bus of its own where loads at the root would miss by more."""
+
+
+NEW_BUSES: Mapping[Kind, int] = {"bus": 0, "line": 1, "units": 1, "both": 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoldedRoot:
+    """What was folded at one bus, and what stands for it."""
+
+    root: str
+    buses: int  #: that are no more
+    loads: int
+    kw: float  #: of these loads, as the feeder had them
+    km: float  #: of lines at the root's own voltage
+    kind: Kind
+    misfit: float  #: of the root's admittance with linear loads, at the worse end of ``ENDS``
+
+    @property
+    def km_lost(self) -> float:
+        """Length on which nothing can break any more."""
+        return 0.0 if self.kind in ("line", "both") else self.km
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Folded:
+    """A feeder with fewer buses, and an account of it."""
+
+    feeder: Feeder
+    buses_before: int
+    buses_after: int
+    level: float
+    roots: tuple[FoldedRoot, ...]
+    kept: frozenset[str]  #: buses of the feeder that are still there
+
+
+def fold(
+    feeder: Feeder,
+    *,
+    keep: Iterable[str] = (),
+    level: float = LEVEL,
+    within: float = WITHIN,
+    kinds: Sequence[Kind] = ("bus", "line", "units", "both"),
+) -> Folded:
+    """Fold laterals and low-voltage networks.
+
+    Kept are all three-phase buses of medium voltage, whatever a control or an event may act on
+    (``foldable.kept_by_default``), the buses in ``keep``, and all on a way between these. Loads
+    keep their names and laws, so that a study draws each one's factor as before; their power
+    becomes what the root sees of it, and they stand at the root or at one bus beyond it.
+
+    Parameters
+    ----------
+    feeder : Feeder
+    keep : iterable of str
+        Further buses that must stay.
+    level : float
+        Factor on all loads at which the fold is exact.
+    within : float
+        Relative error of a root's admittance up to which no bus is spent on it.
+    kinds : sequence of str
+        Equivalents to choose from, the first that is near enough or else the nearest.
+    """
+    volts = bus_volts(feeder)
+    root_of = fold_roots(feeder, kept_by_default(feeder) | set(keep))
+    if not root_of:
+        nothing = dict.fromkeys(("buses_before", "buses_after"), len(volts))
+        return Folded(feeder=feeder, **nothing, level=level, roots=(), kept=frozenset(volts))
+    part = folded_part(feeder, root_of)
+    root_v = _root_volts(part, volts)
+    own = _rows_of_loads(part)
+    state = seen_from_roots(part, root_v, level)
+    km = _km(feeder, root_of, volts)
+    how = _Choice(kinds=kinds, within=within, level=level, km=[km[root] for root in part.roots])
+    chosen = _choose(how, part, state, root_v, own)
+    accounts = _accounts(feeder, root_of, km, chosen)
+    taken = names_in(feeder)
+    stubs: list[Stub] = []
+    moved: dict[str, Load] = {}
+    for n, (account, (equivalent, _)) in enumerate(zip(accounts, chosen, strict=True)):
+        rating = (max(account.kw, 1.0), volts[account.root])
+        ends = (account.root, free_name(account.root, taken))
+        hertz = feeder.source.frequency_hz
+        stubs.append(stub_of(ends, equivalent, account.km, rating, hertz))
+        stub_v = equivalent.stub_gain @ root_v[n]
+        for fit, rows in zip(equivalent.fits, own[n], strict=True):
+            load = part.loads[part.branch_load[rows[0]]]
+            v_was = float(np.abs(state.branch_v[rows]).mean())
+            there = (_mean_y(state, rows), v_was, float(part.branch_v[rows[0]]))
+            moved[load.name] = moved_load(load, stubs[-1].bus, fit, there, stub_v)
+    return Folded(
+        feeder=_rebuilt(feeder, root_of, stubs, moved),
+        buses_before=len(volts),
+        buses_after=len(volts) - len(root_of) + sum(NEW_BUSES[each.kind] for each in accounts),
+        level=level,
+        roots=tuple(accounts),
+        kept=frozenset(set(volts) - set(root_of)),
+    )
+
+
+def _root_volts(part: FoldedPart, volts: Mapping[str, float]) -> Complex:
+    """(R, 3) nominal voltages of the roots."""
+    turn = np.exp(-2j * np.pi / 3.0 * np.arange(3))
+    size = np.array([volts[root] for root in part.roots])
+    return np.asarray(size[:, None] * turn, np.complex128)
+
+
+def _rows_of_loads(part: FoldedPart) -> list[list[NDArray[np.int64]]]:
+    """Of each root its loads, each as rows of the branches."""
+    own: list[list[NDArray[np.int64]]] = [[] for _ in part.roots]
+    for k in range(len(part.loads)):
+        rows = np.flatnonzero(part.branch_load == k)
+        own[part.owner[part.branch_from[rows[0]]]].append(rows)
+    return own
+
+
+def _mean_y(state: Seen, rows: NDArray[np.int64]) -> complex:
+    return complex(state.branch_y_s[rows].mean())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Choice:
+    """How equivalents are chosen, as ``fold`` was told."""
+
+    kinds: Sequence[Kind]
+    within: float
+    level: float
+    km: Sequence[float]  #: of each root
+
+    def kinds_for(self, root: int, loads: int) -> list[Kind]:
+        """What may stand for the folded part: length stays length, where there is any."""
+        if not loads:
+            return ["bus"]
+        useless = "units" if self.km[root] > 0.0 else "both"
+        return [kind for kind in self.kinds if kind != useless]
+
+
+def _choose(
+    how: _Choice,
+    part: FoldedPart,
+    state: Seen,
+    root_v: Complex,
+    own: list[list[NDArray[np.int64]]],
+) -> list[tuple[Equivalent, float]]:
+    """Of each root the first equivalent that is near enough or else the nearest; its misfit."""
+    bare = seen_from_roots(part, root_v, 0.0)
+    truth = [seen_from_roots(part, root_v, at, state.branch_y_s).y_s for at in ENDS]
+    found: list[tuple[Equivalent, float]] = []
+    for n, rows in enumerate(own):
+        loads = [
+            SeenLoad(y_s=_mean_y(state, k), gain=state.gain[k], bare_gain=bare.gain[k])
+            for k in rows
+        ]
+        tried: list[tuple[Equivalent, float]] = []
+        for kind in how.kinds_for(n, len(loads)):
+            equivalent = equivalent_of(kind, how.level, state.y_s[n], bare.y_s[n], loads)
+            off = max(
+                _gap(seen_through(equivalent, at, loads), y[n])
+                for at, y in zip(ENDS, truth, strict=True)
+            )
+            tried.append((equivalent, off))
+            if off <= how.within:
+                break
+        found.append(min(tried, key=lambda pair: pair[1]))
+    return found
+
+
+def _gap(found: Complex, wanted: Complex) -> float:
+    size = float(np.linalg.norm(wanted))
+    return float(np.linalg.norm(found - wanted)) / size if size else 0.0
+
+
+def _km(
+    feeder: Feeder, root_of: Mapping[str, str], volts: Mapping[str, float]
+) -> Mapping[str, float]:
+    """Length of the folded lines at each root's own voltage."""
+    km = defaultdict[str, float](float)
+    for line in feeder.lines:
+        root = root_of.get(line.from_bus) or root_of.get(line.to_bus)
+        if root is not None and volts[line.from_bus] == volts[root]:
+            km[root] += line.length_km
+    return km
+
+
+def _accounts(
+    feeder: Feeder,
+    root_of: Mapping[str, str],
+    km: Mapping[str, float],
+    chosen: Sequence[tuple[Equivalent, float]],
+) -> list[FoldedRoot]:
+    """What is folded at each root."""
+    buses, loads = Counter(root_of.values()), Counter[str]()
+    kw = defaultdict[str, float](float)
+    for load in feeder.loads:
+        root = root_of.get(load.place.bus or "") if load.place is not None else None
+        if root is not None:
+            loads[root] += 1
+            kw[root] += load.kw
+    return [
+        FoldedRoot(
+            root=root,
+            buses=buses[root],
+            loads=loads[root],
+            kw=kw[root],
+            km=km[root],
+            kind=equivalent.kind,
+            misfit=misfit,
+        )
+        for root, (equivalent, misfit) in zip(dict.fromkeys(root_of.values()), chosen, strict=True)
+    ]
+
+
+def _rebuilt(
+    feeder: Feeder,
+    root_of: Mapping[str, str],
+    stubs: Sequence[Stub],
+    moved: Mapping[str, Load],
+) -> Feeder:
+    """The feeder without what is folded, with what stands for it."""
+    lines = [part for part in feeder.lines if not _is_folded(part, root_of)]
+    lines += [stub.line for stub in stubs if stub.line is not None]
+    units = [part for part in feeder.inline_transformers if not _is_folded(part, root_of)]
+    units += [unit for stub in stubs for unit in stub.units]
+    codes = [stub.code for stub in stubs if stub.code is not None]
+    used = {line.code for line in lines}
+    loads = tuple(moved.get(load.name, load) for load in feeder.loads)
+    rows = {
+        "lines": {line.name for line in lines},
+        "inline_transformers": {unit.name for unit in units},
+    }
+    return replace(
+        feeder,
+        lines=tuple(lines),
+        inline_transformers=tuple(units),
+        codes=(*(code for code in feeder.codes if code.name in used), *codes),
+        loads=loads,
+        coordinates=tuple(at for at in feeder.coordinates if at.bus not in root_of),
+        origins={
+            key: origin
+            for key, origin in feeder.origins.items()
+            if key[0] not in rows or key[1] in rows[key[0]]
+        },
+    )
+
+
+def _is_folded(part: Line | InlineTransformer, root_of: Mapping[str, str]) -> bool:
+    return part.from_bus in root_of or part.to_bus in root_of

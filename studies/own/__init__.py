@@ -1,0 +1,1 @@
+"""Data of the user's own: connections, reclosers and measured loads joined to a feeder."""

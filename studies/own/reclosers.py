@@ -1,0 +1,187 @@
+"""Measuring points at existing reclosers, by a table of the user's own: columns name and bus."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import cast, get_args
+
+from ...model.parts import Feeder, Line, Point, Regulator, Switch, VoltageSide
+from ...model.reading.fields import did_you_mean
+from ...model.zones import adjacent_sections, outwards
+from .match import Match, by_name
+from .rows import OwnTable, read_table
+
+__all__ = ["with_points"]
+
+COLUMNS = ("name", "bus", "line", "voltage_side")
+PREFIXES = ("line.", "fuse.", "recloser.", "relay.", "swtcontrol.")
+SIDES = get_args(VoltageSide)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Where:
+    """What is known of the feeder's lines, to place points on them."""
+
+    buses: tuple[str, ...]
+    lines: Mapping[str, Line]
+    at: Mapping[str, Sequence[Line]]  #: lines by either bus
+    order: Mapping[str, int]  #: of buses as the source feeds them, one after the other
+
+
+def with_points(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
+    """Give the feeder the measuring points of a CSV file, and the sections between neighbours.
+
+    The columns are ``name`` and ``bus``, and perhaps ``line`` and ``voltage_side``. Without a line
+    the point stands on the only three-phase line that leads from the bus away from the source, or
+    at the end of the only one that ends there. A ``line`` may also name a switch or a regulator of
+    the bus: the point then stands on the line behind it. These points take the place of all
+    that the feeder had.
+
+    Raises
+    ------
+    InputError
+        With all faults of the file itself.
+    """
+    table = read_table(path)
+    rows = _read(table)
+    where = _where(feeder)
+    points: list[Point] = []
+    not_joined: list[tuple[str, str]] = []
+    for point in rows:
+        found = _placed(feeder, where, point)
+        taken = [p.name for p in points if isinstance(found, Point) and _same_place(p, found)]
+        if isinstance(found, str):
+            not_joined.append((point.name, found))
+        elif taken:
+            not_joined.append((point.name, f"{taken[0]} stands at the same place"))
+        else:
+            points.append(found)
+    sections, left_out = adjacent_sections(feeder, points)
+    notes = [f"{len(sections)} sections between neighbouring points", *left_out]
+    paired = {name for section in sections for name in (section.local, section.remote)}
+    alone = [point.name for point in points if point.name not in paired]
+    if alone:
+        notes.append(f"in no section, without a neighbour: {', '.join(alone)}")
+    if feeder.points:
+        notes.append(f"they take the place of the feeder's {len(feeder.points)} points")
+    ignored = table.others_than(COLUMNS)
+    if ignored:
+        notes.append(f"columns without meaning here: {', '.join(ignored)}")
+    match = Match(
+        source=path.name,
+        what="measuring points",
+        joined=tuple(point.name for point in points),
+        not_joined=tuple(not_joined),
+        without_row=(),
+        notes=tuple(notes),
+    )
+    return replace(feeder, points=tuple(points), sections=sections), match
+
+
+def _read(table: OwnTable) -> list[Point]:
+    """The rows as they stand, names not looked up yet."""
+    table.needs("name", "bus")
+    table.raise_if_any()
+    rows: list[Point] = []
+    for row in table.rows:
+        side = row.cells.get("voltage_side", "").lower() or "line"
+        point = Point(
+            name=row.cells["name"],
+            bus=row.cells["bus"],
+            line=row.cells.get("line", ""),
+            voltage_side=cast(VoltageSide, side),
+        )
+        if not point.name or ":" in point.name or not point.name.isprintable():
+            rule = "must hold a name without ':' or control characters"
+            table.fault(row.line, "column 'name'", rule, repr(point.name))
+        elif any(point.name == other.name for other in rows):
+            table.fault(row.line, "column 'name'", "must be there once", repr(point.name))
+        if not point.bus:
+            table.fault(row.line, "column 'bus'", "must hold a name")
+        if side not in SIDES:
+            rule = f"must be {' or '.join(SIDES)}"
+            table.fault(row.line, "column 'voltage_side'", rule, repr(side))
+        rows.append(point)
+    table.raise_if_any()
+    return rows
+
+
+def _where(feeder: Feeder) -> _Where:
+    at: defaultdict[str, list[Line]] = defaultdict(list)
+    for line in feeder.lines:
+        at[line.from_bus].append(line)
+        at[line.to_bus].append(line)
+    order = {bus: n for n, bus in enumerate(outwards(feeder))}
+    buses = dict.fromkeys([*order, *at])
+    return _Where(
+        buses=tuple(buses),
+        lines={line.name: line for line in feeder.lines},
+        at=at,
+        order=order,
+    )
+
+
+def _placed(feeder: Feeder, where: _Where, row: Point) -> Point | str:
+    """The point on its line, or why it cannot be placed."""
+    name = by_name(where.buses, row.bus)
+    if name is None:
+        # OpenDSS writes the phases behind the name
+        name = by_name(where.buses, row.bus.partition(".")[0])
+    if name is None:
+        return f"no bus is called {row.bus!r}{did_you_mean(row.bus, where.buses)}"
+    row = replace(row, bus=name)
+    if not row.line:
+        return _on_only_line(where, row)
+    wanted = row.line
+    for prefix in PREFIXES:
+        if wanted.lower().startswith(prefix):
+            wanted = wanted[len(prefix) :]
+    line = by_name(tuple(where.lines), wanted)
+    if line is not None:
+        return _on_line(where.lines[line], row)
+    joints: dict[str, Switch | Regulator] = {part.name: part for part in feeder.switches}
+    joints |= {part.name: part for part in feeder.regulators}
+    joint = by_name(tuple(joints), wanted)
+    if joint is None:
+        near = did_you_mean(wanted, where.lines)
+        return f"no line is called {row.line!r}{near}"
+    ends = (joints[joint].from_bus, joints[joint].to_bus)
+    if row.bus not in ends:
+        return f"{joint} does not end at {row.bus}"
+    behind = max(ends, key=lambda bus: where.order.get(bus, -1))
+    return _on_only_line(where, replace(row, bus=behind))
+
+
+def _on_line(line: Line, row: Point) -> Point | str:
+    if row.bus not in (line.from_bus, line.to_bus):
+        return f"line {line.name} does not end at {row.bus}"
+    if len(line.phases) < 3:
+        return f"line {line.name} has phases {line.phases} only; a point measures three"
+    return replace(row, line=line.name)
+
+
+def _on_only_line(where: _Where, row: Point) -> Point | str:
+    """On the only three-phase line away from the source, else at the end of the only one."""
+    own = where.order.get(row.bus)
+    if own is None:
+        return f"nothing feeds {row.bus} while the open switches are open"
+    whole = [line for line in where.at.get(row.bus, ()) if len(line.phases) == 3]
+
+    def leads_on(line: Line) -> bool:
+        far = line.to_bus if line.from_bus == row.bus else line.from_bus
+        return where.order.get(far, -1) > own
+
+    onwards = [line for line in whole if leads_on(line)]
+    if not whole:
+        return f"no three-phase line ends at {row.bus}"
+    if len(onwards) > 1 or (not onwards and len(whole) > 1):
+        names = ", ".join(line.name for line in onwards or whole)
+        return f"several lines leave {row.bus}: the column line must name one of {names}"
+    return replace(row, line=(onwards or whole)[0].name)
+
+
+def _same_place(one: Point, other: Point) -> bool:
+    return (one.bus, one.line) == (other.bus, other.line)
