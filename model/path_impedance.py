@@ -99,7 +99,7 @@ def rest_of_loop_z1_ohm(
     In one loop that is the rest of it. Where loops meet, it is what their lines have between
     the two ends together.
     """
-    looped = np.append(network.tree.carried.any(axis=1), np.ones(network.chords, np.bool_))
+    looped = np.append(network.tree.in_loop, np.ones(network.chords, np.bool_))
     edges = np.flatnonzero(looped & ~on_path)
     if not edges.size:
         return None

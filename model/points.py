@@ -123,8 +123,8 @@ class _State:
 def _state(feeder: Feeder, network: Network, opened: frozenset[str]) -> _State:
     normal = compile_network(feeder)
     touching: defaultdict[str, list[Piece]] = defaultdict(list)
-    for piece in normal.pieces:
-        for name in piece.ends if piece is not None else ():
+    for piece in filter(None, normal.pieces):
+        for name in piece.ends:
             touching[name].append(piece)
     units = [
         network.tree.machine_unit[len(network.machines.motor_load) + n]

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..model.parts import Feeder
 from ..optimise.thresholds import Refusal
 from .run.blocks import run_blocks
@@ -95,7 +97,7 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     watch.lap("validate_s")
     sheets = sheets_of(cases, validations, attempt.number, chosen=True)
     answer = answer_head(cases, attempt) | certified(
-        sheets, given, rivals, sum(own.flags for own in trainings)
+        sheets, given, rivals, np.sum([own.flags for own in trainings], axis=0)
     )
     sizing = Sizing(result=answer, cases=cases, trainings=trainings, validations=validations)
     folder.write("result.json", as_json(answer))

@@ -38,6 +38,6 @@ def fed_through(network: Network, edge: Int, nodes: Int) -> NDArray[np.bool_]:
     for k in range(below.size - 1, 0, -1):
         below[tree.parent[k]] += below[k]
     own = np.where((edge > 0) & (edge < below.size), edge, 0)
-    only = (own > 0) & ~tree.carried.any(axis=1)[own]
+    only = (own > 0) & ~tree.in_loop[own]
     after = nodes[:, None] - own
     return np.asarray(only & (after >= 0) & (after < below[own]))

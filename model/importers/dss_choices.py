@@ -13,7 +13,15 @@ from .dss_live import element_names, fed_kw
 from .dss_records import RawCapacitor, RawCircuit, RawTransformer
 from .findings import Finding, Findings
 
-__all__ = ["CapacitorStates", "Taps", "chosen", "raise_refusals", "with_states", "with_taps", "without"]
+__all__ = [
+    "CapacitorStates",
+    "Taps",
+    "chosen",
+    "raise_refusals",
+    "with_states",
+    "with_taps",
+    "without",
+]
 
 Taps = Mapping[str, Mapping[str, float]]
 """Per transformer and winding (counted from "1") its turns over rated turns; others 1."""
@@ -67,7 +75,9 @@ def chosen(circuit: RawCircuit, drop: Collection[str], source: str) -> tuple[str
         )
         if not fitting:
             rule = f"must be an element of the circuit{did_you_mean(pattern, sorted(known))}"
-            faults.append(Fault(source=source, line=None, where="--drop", wanted=rule, found=repr(wanted)))
+            faults.append(
+                Fault(source=source, line=None, where="--drop", wanted=rule, found=repr(wanted))
+            )
         found += fitting
     if faults:
         raise InputError(faults)
@@ -133,9 +143,7 @@ def raise_refusals(circuit: RawCircuit, findings: Findings, source: str) -> None
             each = f" ({', '.join(shares)})"
         drops = " ".join(f"--drop {_quoted(row.element)}" for row in rows)
         rule = f"cannot be imported: {why}; without it {lost} of the load goes{each}; {drops}"
-        faults.append(
-            Fault(source=source, line=None, where=f"{kind} {names}{more}", wanted=rule)
-        )
+        faults.append(Fault(source=source, line=None, where=f"{kind} {names}{more}", wanted=rule))
     if len(groups) > 1:
         lost = _share(circuit, [row.element for row in refused], total)
         rule = f"without all {len(refused)} of them {lost} of the load goes"

@@ -163,10 +163,17 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
         imported_from=source_name,
     )
     volts = bus_volts(feeder)
-    placed = {build.buses.given[bus]: (x, y) for bus, x, y in circuit.coordinates if bus in build.buses.given}
+    placed = {
+        build.buses.given[bus]: (x, y)
+        for bus, x, y in circuit.coordinates
+        if bus in build.buses.given
+    }
     feeder = replace(
         feeder,
-        loads=(*feeder.loads, *(load for shunt in shunts for load in _shunt_loads(shunt, volts, build))),
+        loads=(
+            *feeder.loads,
+            *(load for shunt in shunts for load in _shunt_loads(shunt, volts, build)),
+        ),
         coordinates=tuple(
             Coordinates(bus=bus, x=x, y=y) for bus, (x, y) in placed.items() if bus in volts
         ),
@@ -209,7 +216,15 @@ def _source(build: _Build, source_name: str) -> Source:
         found = f"{first.phases} on nodes {first.end.nodes}"
         rule = "must have three phases on nodes 1, 2, 3"
         raise InputError(
-            [Fault(source=source_name, line=None, where=f"vsource {first.name!r}", wanted=rule, found=found)]
+            [
+                Fault(
+                    source=source_name,
+                    line=None,
+                    where=f"vsource {first.name!r}",
+                    wanted=rule,
+                    found=found,
+                )
+            ]
         )
     build.findings.add("vsource", first.name, "as it is")
     return Source(
@@ -272,9 +287,7 @@ def _shunts(build: _Build) -> list[RawReactor]:
     return found
 
 
-def _shunt_loads(
-    reactor: RawReactor, volts: Mapping[str, float], build: _Build
-) -> list[Load]:
+def _shunt_loads(reactor: RawReactor, volts: Mapping[str, float], build: _Build) -> list[Load]:
     """Return a shunt reactor as a load: what its mean branch takes at nominal voltage."""
     bus = build.buses.of(reactor.ends[0].bus)
     branch_v = volts[bus] * (3.0**0.5 if reactor.delta else 1.0)

@@ -43,7 +43,9 @@ def line_parts(
         _put_guards(span, ends, in_line.get(span.name, ()), buses, parts, findings)
         if span.opened is not None:
             _put_switch(span, ends, span.opened, span.name, False, buses, parts)
-            findings.note(f"line {span.name} is open: a switch of that name, normally open, at its end")
+            findings.note(
+                f"line {span.name} is open: a switch of that name, normally open, at its end"
+            )
         parts.lines.append(
             Line(
                 name=parts.names.of(span.name),
@@ -74,7 +76,9 @@ def _put_guards(
     for guard in guards:
         terminal = guard.terminal - 1
         if terminal in used or terminal not in (0, 1):
-            findings.add(guard.kind, guard.name, "state kept", "it stands where a switch is already")
+            findings.add(
+                guard.kind, guard.name, "state kept", "it stands where a switch is already"
+            )
             continue
         used.add(terminal)
         _put_switch(span, ends, terminal, guard.name, True, buses, parts)
@@ -103,7 +107,9 @@ def _put_switch(  # noqa: PLR0913, PLR0917
 
 def _code(span: Span, parts: LineParts) -> LineCode:
     """Return the code with the line's matrices per km, a new one where none is equal."""
-    r, x, c = (rows_per_km(matrix, span.length_km) for matrix in (span.r_ohm, span.x_ohm, span.c_nf))
+    r, x, c = (
+        rows_per_km(matrix, span.length_km) for matrix in (span.r_ohm, span.x_ohm, span.c_nf)
+    )
     if (r, x, c) not in parts.codes:
         charged = any(value != 0.0 for row in c for value in row)
         parts.codes[(r, x, c)] = LineCode(

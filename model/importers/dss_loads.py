@@ -120,9 +120,13 @@ def _normal_zip(law: Load, kw: float, kvar: float) -> tuple[float, float, Load]:
     assert law.zip is not None
     p, q = sum(law.zip[:3]), sum(law.zip[3:])
     z, i, s, zq, iq, sq = (
-        *(share / p for share in law.zip[:3]),
-        *(share / q for share in law.zip[3:]),
-    ) if p and q else law.zip
+        (
+            *(share / p for share in law.zip[:3]),
+            *(share / q for share in law.zip[3:]),
+        )
+        if p and q
+        else law.zip
+    )
     return kw * (p or 1.0), kvar * (q or 1.0), replace(law, zip=(z, i, s, zq, iq, sq))
 
 

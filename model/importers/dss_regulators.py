@@ -134,7 +134,9 @@ def _add_bank(
         found.units.add(unit.raw.name)
         lost = unit.raw.noload_pct or unit.raw.imag_pct
         how = "a regulator" + (", its no-load branch left out" if lost else "")
-        banks.findings.add("transformer", unit.raw.name, "approximated" if lost else "as it is", how)
+        banks.findings.add(
+            "transformer", unit.raw.name, "approximated" if lost else "as it is", how
+        )
     if len(group) > 1:
         members = ", ".join(unit.raw.name for unit in group)
         banks.findings.note(f"transformers {members} became regulator {found.regulators[-1].name}")
@@ -185,14 +187,20 @@ def _step(group: Sequence[_Unit]) -> float | None:
 def _jumper(reference: Reference, buses: tuple[str, str], spans: Sequence[Span]) -> Span | None:
     """Return the line through which the phase goes that others refer to."""
     for span in spans:
-        if set(span.buses) == set(buses) and letters(span.nodes) == reference and span.opened is None:
+        if (
+            set(span.buses) == set(buses)
+            and letters(span.nodes) == reference
+            and span.opened is None
+        ):
             return span
     return None
 
 
 def _bank_name(group: Sequence[_Unit]) -> str:
     named = {unit.raw.bank for unit in group}
-    return named.pop() if len(named) == 1 and len(group) > 1 and "" not in named else group[0].raw.name
+    return (
+        named.pop() if len(named) == 1 and len(group) > 1 and "" not in named else group[0].raw.name
+    )
 
 
 def with_tap_changer(

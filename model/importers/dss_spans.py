@@ -48,7 +48,9 @@ def spans_of(circuit: RawCircuit, live: set[Node], findings: Findings) -> list[S
     """Return every line and series reactor that is fed."""
     unit_km = _usual_unit(circuit.lines, findings)
     found = [_span(line, unit_km, live, findings) for line in circuit.lines]
-    found += [_reactor_span(reactor, live, findings) for reactor in filter(is_series, circuit.reactors)]
+    found += [
+        _reactor_span(reactor, live, findings) for reactor in filter(is_series, circuit.reactors)
+    ]
     return [span for span in found if span is not None]
 
 
@@ -70,7 +72,9 @@ def _usual_unit(lines: Sequence[RawLine], findings: Findings) -> float:
     if not ohms or median(ohms) <= 0.0:
         return _SHORT_KM
     middle = median(ohms)
-    unit = min(_UNITS_KM, key=lambda name: abs(math.log(middle / _UNITS_KM[name] / _USUAL_OHM_PER_KM)))
+    unit = min(
+        _UNITS_KM, key=lambda name: abs(math.log(middle / _UNITS_KM[name] / _USUAL_OHM_PER_KM))
+    )
     findings.note(
         f"{len(ohms)} lines have a length without a unit: taken as {unit}, which makes their "
         f"median |Z1| {middle / _UNITS_KM[unit]:.3g} ohm/km; impedances do not depend on it"

@@ -92,7 +92,10 @@ def _three_phase(unit: RawTransformer, banks: Banks) -> InlineTransformer | None
     """Return the row of a three-phase unit, None where its phases are not joined in a usual way."""
     first, second = unit.windings
     coils = {
-        tuple((p, 0 if not winding.delta else q) for winding, (p, q) in zip(unit.windings, limb, strict=True))
+        tuple(
+            (p, 0 if not winding.delta else q)
+            for winding, (p, q) in zip(unit.windings, limb, strict=True)
+        )
         for limb in coils_of(unit)
     }
     kinds = ["D" if winding.delta else "Y" for winding in unit.windings]
@@ -106,7 +109,8 @@ def _three_phase(unit: RawTransformer, banks: Banks) -> InlineTransformer | None
         for winding in unit.windings
     ]
     joined = any(
-        not winding.delta and (winding.end.bus, winding.end.nodes[3]) in banks.neutrals.shared
+        not winding.delta
+        and (winding.end.bus, winding.end.nodes[3]) in banks.neutrals.shared
         and winding.end.nodes[3] > 3
         for winding in unit.windings
     )
@@ -154,7 +158,10 @@ def _singles(
     for winding in unit.windings:
         if winding.delta:
             continue
-        if neutral_ohm(winding, unit.phases, banks.neutrals) != 0j and winding.end.nodes[unit.phases] > 3:
+        if (
+            neutral_ohm(winding, unit.phases, banks.neutrals) != 0j
+            and winding.end.nodes[unit.phases] > 3
+        ):
             return refuse("its neutral is not solidly earthed, and its phases are no usual three")
     rows = []
     for limb, coils in enumerate(coils_of(unit)):
@@ -214,7 +221,9 @@ def _centre_tap(
     if leg_one[0] == 0:
         # both turned: the legs change their places
         one, two, leg_one, leg_two = two, one, leg_two, leg_one
-    lies = leg_one[0] in (1, 2, 3) and leg_one[1] == 0 and leg_two[0] == 0 and leg_two[1] in (1, 2, 3)
+    lies = (
+        leg_one[0] in (1, 2, 3) and leg_one[1] == 0 and leg_two[0] == 0 and leg_two[1] in (1, 2, 3)
+    )
     if one.end.bus != two.end.bus or not lies or leg_one[0] == leg_two[1]:
         return refuse("three windings that are no two legs of opposite sense on one bus")
     if one.kv != two.kv or one.tap != two.tap:

@@ -47,7 +47,11 @@ LINES: tuple[Field, ...] = (
         name="length_km", kind="number", unit="km", above=0.0, required=True, doc="Route length."
     ),
     replace(PHASES, doc="The conductors it has, in the order of its code's rows."),
-    Field(name="code", kind="name", doc="How it is built; or give `z1_ohm_per_km` and `z0_ohm_per_km`."),
+    Field(
+        name="code",
+        kind="name",
+        doc="How it is built; or give `z1_ohm_per_km` and `z0_ohm_per_km`.",
+    ),
     Field(
         name="z1_ohm_per_km",
         kind="impedance",

@@ -47,7 +47,12 @@ NOT_COVERED = (
 
 SPENT = "this sample is spent: run again with a new --seed"
 
-FLAGS = ("dead", "floating", "not_converged")  #: in the order in which blocks count them
+FLAGS = (
+    "dead",
+    "floating",
+    "unearthed",
+    "not_converged",
+)  #: in the order in which blocks count them
 
 #: the criteria in the order in which a verdict names the first that fails
 CAUSES = tuple(reason for reason in Reason if reason != Reason.TRIP)
@@ -84,7 +89,7 @@ def numerics(
 ) -> dict[str, Any]:
     """Scenarios with a dead conductor, a floating island, or loads that did not settle.
 
-    ``training`` are the (3,) counts of the sample on which settings were chosen, if any.
+    ``training`` are the counts of the sample on which settings were chosen, if any.
     """
     flags = np.sum([own.flags for own in validations], axis=0)
     scenarios = np.sum([own.scenarios for own in validations], axis=0)

@@ -131,7 +131,7 @@ class Training:
     front: tuple[Front, ...]
     trials: NDArray[np.int64]  #: (R, T)
     reachable: NDArray[np.int64]  #: (T,)
-    flags: NDArray[np.int64]  #: (3,) scenarios dead, floating, not converged
+    flags: NDArray[np.int64]  #: (4,) scenarios by ``tally.FLAGGED``
 
 
 def gather(blocks: Iterable[Trained]) -> Training:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...detector.criteria import Options, Reach, Reason, Settings, reach_of, verdict
 from ...detector.evidence import only
 from ...model.solver.breaks import DEAD, FLOATING
-from ...model.states import NOT_CONVERGED
+from ...model.states import NOT_CONVERGED, UNEARTHED
 from ...optimise.counts import Corners, corners_of
 from ...optimise.staircase import Front, front_of
 from .along import distance_share
@@ -24,6 +24,9 @@ __all__ = ["PLACES", "Tested", "Trained", "judge_block", "train_block"]
 
 PLACES = 40  #: stretches of a section in which breaks are counted for the profile
 KEPT = 40  #: scenarios of a block whose evidence is kept for pictures
+
+FLAGGED = (DEAD, FLOATING, UNEARTHED, NOT_CONVERGED)
+"""A dead conductor; a floating island; a part that nothing earths; no solution."""
 
 Int = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -39,7 +42,7 @@ class Trained:
     front: tuple[Front, ...]  #: of the same events
     trials: Int  #: (R, T) per reported class
     reachable: Int  #: (T,)
-    flags: Int  #: (3,) scenarios dead, floating, not converged
+    flags: Int  #: (4,) scenarios by ``FLAGGED``
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,7 +60,7 @@ class Tested:
     profile: Int  #: (T, PLACES, 2) internal breaks along the section: all, found
     front: tuple[Front, ...]  #: false trips of the chosen setting, per terminal
     least_z_ohm: NDArray[np.float64]  #: (T,) smallest |Z1| of these, see ``_least_z``
-    flags: Int  #: (3,) scenarios dead, floating, not converged
+    flags: Int  #: (4,) scenarios by ``FLAGGED``
     verdicts: NDArray[np.uint8]  #: (T, S) what the first setting said, as ``pack_verdicts``
     sample: NDArray[np.float64]  #: (T, 5, KEPT) as ``_sample`` has it
     sample_side: NDArray[np.int8]  #: (T, KEPT)
@@ -190,8 +193,8 @@ def _alarmed(seen: Observed) -> Flags:
 
 
 def _flags(seen: Observed) -> Int:
-    """(3,): scenarios with a dead conductor, a floating island, or without a solution."""
-    return np.array([(seen.flags & bit != 0).sum() for bit in (DEAD, FLOATING, NOT_CONVERGED)])
+    """(4,): scenarios by ``FLAGGED``."""
+    return np.array([(seen.flags & bit != 0).sum() for bit in FLAGGED])
 
 
 def _least_z(seen: Observed, t: int, chosen: Settings | None, reachable: Flags) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...optimise.staircase import Front, merge_fronts
 from .classes import DrawClass
 from .draw import BlockId
-from .tally import Tested
+from .tally import FLAGGED, Tested
 
 __all__ = ["Validation", "add_up"]
 
@@ -32,7 +32,7 @@ class Validation:
     profile: NDArray[np.int64]  #: (T, PLACES, 2)
     front: tuple[Front, ...]
     least_z_ohm: NDArray[np.float64]  #: (T,)
-    flags: NDArray[np.int64]  #: (DrawClass, 3)
+    flags: NDArray[np.int64]  #: (DrawClass, 4) by ``tally.FLAGGED``
     scenarios: NDArray[np.int64]  #: (DrawClass,)
     samples: tuple[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]], ...]  #: for pictures
 
@@ -52,7 +52,7 @@ def add_up(blocks: Iterable[tuple[BlockId, Tested]], size: int) -> Validation:
     front: tuple[Front, ...] = ()
     samples: list[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]]] = []
     least = np.array(np.inf)
-    flags = np.zeros((len(DrawClass), 3), np.int64)
+    flags = np.zeros((len(DrawClass), len(FLAGGED)), np.int64)
     count = np.zeros(len(DrawClass), np.int64)
     for which, block in blocks:
         count[which.drawn] += size

@@ -32,7 +32,8 @@ def assumptions(result: dict[str, Any], study: Study) -> str:
     numerics = result["numerics"]
     solved = (
         "Numerics: what an opened conductor leads to is dead (nothing connected, or no source) in "
-        f"{numerics['dead']:,} validation scenarios and floating in {numerics['floating']:,}; "
+        f"{numerics['dead']:,} validation scenarios and floating in {numerics['floating']:,}; nothing "
+        f"earths a part behind an ungrounded winding in {numerics['unearthed']:,}; "
         f"{numerics['not_converged']:,} did not converge{_unsettled(numerics)}."
     )
     drawn = {own["name"] for row in result["sections"] for own in row["classes"]}

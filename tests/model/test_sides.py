@@ -149,7 +149,7 @@ def test_ten_terminals_on_three_thousand_buses_take_seconds(loops: int) -> None:
     rng = np.random.default_rng(2)
     trunk = [(k - 1, k) for k in range(1, 400)]
     laterals = [(int(rng.integers(max(0, k - 600), k)), k) for k in range(400, 3000)]
-    across = [(40 * n + 3, 40 * n + 25) for n in range(loops)]
+    across = [(60 * n + 53, 60 * n + 75) for n in range(loops)]
     own = feeder_of([*trunk, *laterals, *across], [])
     points = tuple(Point(name=f"P{n}", bus=str(n), line=f"{n}-{n + 1}") for n in range(50, 351, 60))
     sections = tuple(Section(local=a.name, remote=b.name) for a, b in pairwise(points))

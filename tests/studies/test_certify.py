@@ -102,7 +102,7 @@ def validation(
         profile=np.zeros((TERMINALS, 40, 2), np.int64),
         front=(NONE,) * TERMINALS,
         least_z_ohm=np.full(TERMINALS, np.inf),
-        flags=np.zeros((len(DrawClass), 3), np.int64),
+        flags=np.zeros((len(DrawClass), 4), np.int64),
         scenarios=np.full(len(DrawClass), 10 * n, np.int64),
         samples=(),
     )

@@ -20,7 +20,6 @@ from oracles.whole import whole_feeder, whole_study
 from openphase.detector.criteria import Options, Reason, Settings, reach_of, verdict
 from openphase.model import load_feeder
 from openphase.model.parts import Feeder, Switch
-from openphase.model.solver.breaks import DEAD, FLOATING
 from openphase.model.states import NOT_CONVERGED
 from openphase.optimise.counts import Grid, count_tensor
 from openphase.studies.run import tally
@@ -29,7 +28,7 @@ from openphase.studies.run.classes import FALLEN, REPORTED, DrawClass, Purpose, 
 from openphase.studies.run.draw import BlockId, Case, draw_scenarios, make_case, make_cases
 from openphase.studies.run.engine import Observed, observe
 from openphase.studies.run.store import pack
-from openphase.studies.run.tally import Trained, judge_block, train_block
+from openphase.studies.run.tally import FLAGGED, Trained, judge_block, train_block
 from openphase.studies.run.verdicts import unpack_verdicts
 from openphase.studies.spec.study_file import Group, Study, default_study
 
@@ -395,7 +394,7 @@ def test_judged_blocks_add_up(kind: str, drawn: DrawClass) -> None:
     np.testing.assert_array_equal(tested.profile[..., 0].sum(axis=1), tested.trials[breaks])
     np.testing.assert_array_equal(tested.profile[..., 1].sum(axis=1), tested.trips[0, breaks])
     assert (tested.profile[..., 1] <= tested.profile[..., 0]).all()
-    bits = [int((known.flags & bit != 0).sum()) for bit in (DEAD, FLOATING, NOT_CONVERGED)]
+    bits = [int((known.flags & bit != 0).sum()) for bit in FLAGGED]
     assert tested.flags.tolist() == bits
     assert not tested.trips[1].any()  # no setting never trips
     np.testing.assert_array_equal(tested.sample_side, known.side[:, : tested.sample.shape[-1]])

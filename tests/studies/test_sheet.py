@@ -96,9 +96,9 @@ def answer(local: str = "R1", remote: str = "R2", feeder: str = "made up") -> di
 
 
 NUMERICS = {
-    **{"dead": 9, "floating": 0, "not_converged": 0, "training_not_converged": 0},
+    **{"dead": 9, "floating": 0, "unearthed": 0, "not_converged": 0, "training_not_converged": 0},
     "by_class": [
-        {"name": name, "scenarios": 4000, "dead": 0, "floating": 0, "not_converged": 0}
+        {"name": name, "scenarios": 4000, "dead": 0, "not_converged": 0}
         for name in ("open_phase", "load_step")
     ],
 }

@@ -326,8 +326,14 @@ BETWEEN = " stands between two buses, in [[inline_transformers]]"
         ("Yy0", "a low-voltage wye winding without a grounded neutral, which" + BETWEEN),
         ("Y/Yg", "an ungrounded wye winding above a grounded one, which" + BETWEEN),
         ("Zy", "a zigzag winding, which has no model"),
-        ("V/V", "an open bank of two units, which stand between two buses, in [[inline_transformers]]"),
-        ("open-delta", "an open bank of two units, which stand between two buses, in [[inline_transformers]]"),
+        (
+            "V/V",
+            "an open bank of two units, which stand between two buses, in [[inline_transformers]]",
+        ),
+        (
+            "open-delta",
+            "an open bank of two units, which stand between two buses, in [[inline_transformers]]",
+        ),
         ("single-phase", "a single-phase unit, which" + BETWEEN),
         ("SWER", "a single-phase unit, which" + BETWEEN),
         ("Yg/Yg/D", "a three-winding unit, which has no model"),
