@@ -16,8 +16,9 @@ from ..model.events.phases import count_phases
 from ..model.network import Network, assumed_connection, compile_network
 from ..model.parts import Der, Feeder, InlineTransformer, Load, Place, Regulator, Switch
 from ..model.points import Terminal, find_points
-from ..model.reading.feeder_file import load_feeder
+from ..model.sides import Side
 from ..model.reading.provenance import assumptions, count_origins
+from .loading import load_with_points
 from .run.store import as_json
 from .show.check_text import check_text
 from .spec.study_file import Study, check_study, default_study
@@ -29,18 +30,18 @@ SHIFTING = ("D/Yg", "D/Y", "Yg/D", "Y/D")  #: the phasors of either side stand 3
 
 def check_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code. Faults of the file have ended it before."""
-    feeder = load_feeder(args.feeder)
+    feeder, chosen = load_with_points(args.feeder)
     study = default_study(args.feeder)
     check_study(study, feeder, "study.toml")
-    found = summary(feeder, study)
+    found = summary(feeder, study, chosen)
     if args.plot:
         _plot(feeder, args.plot)
     print(as_json(found) if args.json else check_text(found), end="")
     return 0
 
 
-def summary(feeder: Feeder, study: Study) -> dict[str, Any]:
-    """What ``check --json`` prints."""
+def summary(feeder: Feeder, study: Study, chosen: tuple[str, ...] = ()) -> dict[str, Any]:
+    """What ``check --json`` prints; ``chosen`` tells how the points came about, if by default."""
     network = compile_network(feeder)
     source = feeder.source
     found: dict[str, Any] = {
@@ -54,6 +55,8 @@ def summary(feeder: Feeder, study: Study) -> dict[str, Any]:
         "line_km_by_phases": _km_by_phases(network, network.length_km > 0),
         "load_kw": sum(load.kw for load in feeder.loads),
         "points": [point.name for point in feeder.points],
+        "points_kv_ll": _kv_at_points(feeder, network),
+        "points_by_default": list(chosen),
         "sections": [],
         "loop": [switch.name for switch in feeder.switches if not switch.closed],
         "ders": [{"name": d.name, "kw": d.kw, "model": d.model} for d in feeder.ders],
@@ -96,7 +99,11 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "downstream_kw": [far * level[0] * each[0], near * level[1] * each[1]],
         "downstream_kw_nominal": [far, near],
         "units": [unit.name for unit in units],
-        "yg_d": [unit.name for unit in units if unit.connection == "Yg/D"],
+        "yg_d": [
+            unit.name
+            for unit in (*units, *filter(inside.joins, feeder.inline_transformers))
+            if unit.connection == "Yg/D"
+        ],
         "yg_d_sampled": [unit.name for unit in units if unit.name in study.transformers.yg_d],
         # on three wires an unknown unit has no neutral to be Yg by
         "yg_d_unknown": [
@@ -154,6 +161,12 @@ def _inside(feeder: Feeder, network: Network, terminal: Terminal) -> _Inside:
     return _Inside(lines=lines, buses=frozenset(touched - outer), ends=ends)
 
 
+def _kv_at_points(feeder: Feeder, network: Network) -> list[float]:
+    """Nominal voltages between phases at which points stand, rising."""
+    volts = {network.node_v[network.node(point.bus)] for point in feeder.points}
+    return sorted(round(float(v) * 3.0**0.5 / 1000.0, 6) for v in volts)
+
+
 def _km_by_phases(network: Network, chosen: NDArray[np.bool_]) -> list[float]:
     """Length of the chosen edges with one, two and three phases."""
     count = count_phases(network.tree.phases)
@@ -161,10 +174,16 @@ def _km_by_phases(network: Network, chosen: NDArray[np.bool_]) -> list[float]:
 
 
 def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: bool) -> float:
-    """Nominal kW of load beyond the section's first edge, or beyond its last."""
+    """Nominal kW of load beyond the section's first edge, or beyond its last.
+
+    Where loops are closed, that which the source reaches over the section alone.
+    """
     path = [int(k) for k in np.flatnonzero(terminal.on_path)]
-    edge = min(path) if nearest else max(path)
-    loaded = network.below(edge)[network.load_node]
+    below = network.below(min(path) if nearest else max(path))
+    if network.chords:
+        below = terminal.node_side == Side.DOWNSTREAM
+        below |= nearest & (terminal.node_side == Side.LATERAL)
+    loaded = below[network.load_node]
     return float(sum(load.kw for load, own in zip(feeder.loads, loaded, strict=True) if own))
 
 

@@ -85,7 +85,7 @@ def _put_guards(
         findings.add(guard.kind, guard.name, "as it is", "a switch, closed")
 
 
-def _put_switch(  # noqa: PLR0913, PLR0917
+def _put_switch(  # noqa: PLR0913
     span: Span,
     ends: list[str],
     terminal: int,

@@ -48,13 +48,13 @@ class Wired:
 class Sites:
     """Lines of medium voltage on which events of a class may stand."""
 
-    lines: Places  #: all of them, for breaks
     regions: tuple[Places, ...]  #: of each section, and of what lies alike to all of them
+    alike: tuple[Places, ...]  #: the same with paths and laterals apart, for breaks
 
     @property
     def edges(self) -> NDArray[np.int64]:
         """All the edges."""
-        return self.lines.edges
+        return np.concatenate([own.edges for own in self.alike])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -172,25 +172,24 @@ def _sites(network: Network, points: Points, least_phases: int) -> Sites:
     """Lines of medium voltage with at least so many phases."""
     medium = _medium_voltage(network, points)
     sections = [terminal.in_section for terminal in points.terminals[::2]]
-    regions = [
-        places_on(network, medium & chosen, least_phases)
-        for chosen in (*sections, *_beside(points, ~np.any(sections, axis=0)))
-    ]
-    return Sites(
-        lines=places_on(network, medium, least_phases),
-        regions=tuple(region for region in regions if region.edges.size),
-    )
+    rest = ~np.any(sections, axis=0)
+
+    def places(chosen: Iterable[NDArray[np.bool_]]) -> tuple[Places, ...]:
+        found = (places_on(network, medium & own, least_phases) for own in chosen)
+        return tuple(own for own in found if own.edges.size)
+
+    alike = _alike(points)
+    return Sites(regions=places([*sections, *(own & rest for own in alike)]), alike=places(alike))
 
 
-def _beside(points: Points, rest: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
-    """What is in no section, in parts that lie alike to every section.
+def _alike(points: Points) -> list[NDArray[np.bool_]]:
+    """Parts of the network that lie alike to every section.
 
-    A short stretch upstream of all would hardly be drawn, if long laterals were one with it.
+    A short path, or a stretch upstream of all, would hardly be drawn as one with long laterals.
     """
     sides = np.stack([terminal.edge_side for terminal in points.terminals[::2]])
-    _, part = np.unique(sides, axis=1, return_inverse=True)
-    part = part.reshape(-1)
-    return [rest & (part == n) for n in np.unique(part[rest])]
+    parts, part = np.unique(sides, axis=1, return_inverse=True)
+    return [part.reshape(-1) == n for n in range(parts.shape[1])]
 
 
 def _medium_voltage(network: Network, points: Points) -> NDArray[np.bool_]:

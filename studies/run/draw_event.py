@@ -99,11 +99,11 @@ def _sites(case: Case, drawn: DrawClass) -> Sites:
 
 def _open_phase(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     share = case.study.events.open_phase.two_phase_share
-    return draw_open_phase(rng, size, case.network, sites.lines, share)
+    return draw_open_phase(rng, size, case.network, sites.alike, share)
 
 
 def _open_three(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
-    return draw_open_three(rng, size, case.network, sites.lines)
+    return draw_open_three(rng, size, case.network, sites.alike)
 
 
 def _load_step(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:

@@ -15,9 +15,9 @@ STATED = (
     "Two steady states of the feeder, ΔT apart, with one event between them. Every scenario draws "
     "all loads, what is unknown of the transformers, DER and motors afresh, and small changes of "
     "the source and of each load, whatever the event.",
-    "Breaks of one, two or all three conductors are uniform in length over all lines; other "
-    "events pick a section first, every one equally likely, then a place uniform in length. They "
-    "stand on lines of medium voltage, take phases that are there, and scale with the nominal "
+    "Events pick a region first, every one equally likely, then a place uniform in length: a "
+    "section, or what lies alike to all sections; for breaks a section's path and its laterals are "
+    "two regions. They stand on lines of medium voltage, take phases that are there, and scale with the nominal "
     "voltage of their place.",
     "Where the study draws their exponents, loads are constant impedance below 0.7 pu; else each "
     "follows its own law.",
@@ -32,8 +32,8 @@ def assumptions(result: dict[str, Any], study: Study) -> str:
     numerics = result["numerics"]
     solved = (
         "Numerics: what an opened conductor leads to is dead (nothing connected, or no source) in "
-        f"{numerics['dead']:,} validation scenarios and floating in {numerics['floating']:,}; nothing "
-        f"earths a part behind an ungrounded winding in {numerics['unearthed']:,}; "
+        f"{numerics['dead']:,} validation scenarios and floating in {numerics['floating']:,}; "
+        f"nothing earths a part behind an ungrounded winding in {numerics['unearthed']:,}; "
         f"{numerics['not_converged']:,} did not converge{_unsettled(numerics)}."
     )
     drawn = {own["name"] for row in result["sections"] for own in row["classes"]}

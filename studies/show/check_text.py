@@ -11,6 +11,7 @@ from .sheet import PAGE, wrapped
 __all__ = ["check_text"]
 
 LONG_LIST = 16  #: columns in which a list of names may run on below itself
+FEW = 8  #: in-line transformers that are named
 MOST_NAMES = 60  #: names of a list; past them, how many more there are
 INSIDE = ("units", "ders", "capacitors", "inline_transformers", "regulators", "switches")
 """What is listed as inside a section."""
@@ -20,11 +21,12 @@ def check_text(found: dict[str, Any]) -> str:
     """The summary for people, in 100 columns."""
     lines = [
         *wrapped(
-            f"{found['feeder']}: no faults; {found['kv_ll']:g} kV, {found['wires']} wires, "
+            f"{found['feeder']}: no faults; {_volts(found)}, {found['wires']} wires, "
             f"neutral {found['neutral']}, {found['line_km']:.5g} km of line"
             f"{_shares(found['line_km_by_phases'])}, "
             f"{found['load_kw']:g} kW, {len(found['points'])} measuring points"
         ),
+        *(line for text in found["points_by_default"] for line in wrapped(f"by default: {text}")),
         "",
         *(_sections(found["sections"]) or ["no sections: nothing to size"]),
         *(["?: the connection is unknown"] if _any_unknown(found["sections"]) else []),
@@ -36,6 +38,16 @@ def check_text(found: dict[str, Any]) -> str:
     for text in found["assumed"]:
         lines += wrapped(f"- {text}")
     return "\n".join(lines) + "\n"
+
+
+def _volts(found: dict[str, Any]) -> str:
+    at_points = [kv for kv in found["points_kv_ll"] if kv != found["kv_ll"]]
+    source = f"{found['kv_ll']:g} kV"
+    return f"{source} at the source, {_kv(at_points)} at the points" if at_points else source
+
+
+def _kv(values: list[float]) -> str:
+    return f"{' and '.join(f'{kv:g}' for kv in values)} kV"
 
 
 def _any_unknown(sections: list[dict[str, Any]]) -> bool:
@@ -56,10 +68,7 @@ def _elements(found: dict[str, Any]) -> list[str]:
         ],
     }
     if found["inline_transformers"]:
-        parts["in-line transformers"] = [
-            f"{t['name']} ({t['connection']}, {t['kv'][0]:g}/{t['kv'][1]:g} kV)"
-            for t in found["inline_transformers"]
-        ]
+        parts["in-line transformers"] = _inline(found["inline_transformers"])
     lines = []
     for what, names in parts.items():
         lines += wrapped(f"{what}: {_listed(names) or 'none'}")
@@ -78,6 +87,29 @@ def _elements(found: dict[str, Any]) -> list[str]:
                 f"{', '.join(row['regulators'])} may change, which looks like an open phase"
             )
     return lines
+
+
+def _inline(rows: list[dict[str, Any]]) -> list[str]:
+    """In-line transformers, of a kind together: connection and voltages."""
+    kinds: dict[str, list[str]] = {}
+    for row in rows:
+        kind = f"{row['connection']}, {row['kv'][0]:g}/{row['kv'][1]:g} kV"
+        kinds.setdefault(kind, []).append(row["name"])
+    return [
+        f"{names[0] if len(names) == 1 else len(names)} ({kind})" for kind, names in kinds.items()
+    ]
+
+
+def _inside(row: dict[str, Any]) -> str:
+    """What stands inside a section; of very many in-line transformers only how many."""
+    few = [
+        name
+        for kind in INSIDE
+        if kind != "inline_transformers" or len(row[kind]) <= FEW
+        for name in row[kind]
+    ]
+    count = len(row["inline_transformers"])
+    return _listed([*few, *([f"{count} in-line transformers"] if count > FEW else [])])
 
 
 def _shares(km: list[float]) -> str:
@@ -128,7 +160,7 @@ def _sections(rows: list[dict[str, Any]]) -> list[str]:
                 f"{low:.0f} .. {high:.0f}",
                 _listed(row["yg_d"]) or "-",
                 _listed([*row["yg_d_sampled"], *(f"{n}?" for n in row["yg_d_unknown"])]) or "-",
-                _listed([name for kind in INSIDE for name in row[kind]]) or "-",
+                _inside(row) or "-",
             ]
         )
     wide = [max(len(line[n]) for line in cells) for n in range(7)]
