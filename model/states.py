@@ -180,9 +180,9 @@ class Work(NamedTuple):
     here_x: Complex  #: (C, 3, 3) X
     here_h: Complex  #: (C, 3, 3) H
     row: Complex  #: (C, 3) scratch
-    event: Complex  #: (3, 3, 3) F above the event node, P at it, F below
-    event_h: Complex  #: (3, C, 3, 3) the H of these
-    event_j: Complex  #: (3, 3) their companions
+    event: Complex  #: (4, 3, 3) F above the event node, P at it, F below; F of a loose edge
+    event_h: Complex  #: (4, C, 3, 3) the H of these
+    event_j: Complex  #: (4, 3) their companions
     stub: Complex  #: (2, 3) voltages of p and q
     winding_v_pu: Real  #: (N,) the scenario's ``Answer.winding_v_pu``
     history: Real  #: (3, N) of these: the last pass's, its gaps, and this pass's gaps
@@ -221,9 +221,9 @@ def workspace(tree: Tree) -> Work:
         here_x=zeros(chords, 3, 3),
         here_h=zeros(chords, 3, 3),
         row=zeros(chords, 3),
-        event=zeros(3, 3, 3),
-        event_h=zeros(3, chords, 3, 3),
-        event_j=zeros(3, 3),
+        event=zeros(4, 3, 3),
+        event_h=zeros(4, chords, 3, 3),
+        event_j=zeros(4, 3),
         stub=zeros(2, 3),
         winding_v_pu=np.zeros(windings),
         history=np.zeros((3, windings)),

@@ -23,9 +23,11 @@ from .matrix3 import (
 )
 from .series import carry, carry_current, per_fork, up
 
-__all__ = ["climb_event", "climb_loose", "cross", "descend_event"]
+__all__ = ["ABOVE", "AT", "BELOW", "climb_event", "climb_loose", "cross", "descend_event"]
 
 Flags = NDArray[np.bool_]
+
+ABOVE, AT, BELOW, LOOSE = 0, 1, 2, 3  #: slots of `Work.event`
 
 
 @compiled_apart
@@ -77,7 +79,7 @@ def climb_event(
 ) -> int:
     """Eliminate edge k with the event node on it; returns flags."""
     start_at(work, k, y, x_j, carried)
-    climb_series(work, 2, scaled(z, 1.0 - share), carried)
+    climb_series(work, BELOW, scaled(z, 1.0 - share), carried)
     x_j = load_vector(work.here_j, 0)
     fed = x_j[0] != 0.0 or x_j[1] != 0.0 or x_j[2] != 0.0
     for c in range(carried.size):
@@ -101,13 +103,13 @@ def cross(work: Work, z: Matrix, mask: int, below: int, carried: Flags) -> int:
     flags = 0
     if mask:
         flags = open_phases(mask, work, carried)
-        store(work.event, 1, load(here, 1))
-        store_vector(work.event_j, 1, load_vector(work.here_j, 1))
+        store(work.event, AT, load(here, 1))
+        store_vector(work.event_j, AT, load_vector(work.here_j, 1))
         for c in range(carried.size):
             if carried[c]:
-                store(work.event_h[1], c, load(work.here_h, c))
+                store(work.event_h[AT], c, load(work.here_h, c))
     store(here, 0, add(load(here, 0), load(work.event_y, 1 - below)))
-    climb_series(work, 0, z, carried)
+    climb_series(work, ABOVE, z, carried)
     return flags
 
 
@@ -123,12 +125,12 @@ def descend_event(
         tree.fork,
         work.v,
     )
-    v = plus(times(load(event, 0), above), load_vector(event_j, 0))
-    v = per_fork(event_h[0], carried, fork, v_all, v)
+    v = plus(times(load(event, ABOVE), above), load_vector(event_j, ABOVE))
+    v = per_fork(event_h[ABOVE], carried, fork, v_all, v)
     store_vector(work.stub, near, v)
     if mask:
-        v = plus(times(load(event, 1), v), load_vector(event_j, 1))
-        v = per_fork(event_h[1], carried, fork, v_all, v)
+        v = plus(times(load(event, AT), v), load_vector(event_j, AT))
+        v = per_fork(event_h[AT], carried, fork, v_all, v)
     store_vector(work.stub, 1 - near, v)
     return v
 
@@ -141,12 +143,12 @@ def climb_loose(
     start_at(work, k, y, x_j, carried)
     flags = free_modes(tree, k, work, carried)
     p, p_j = load(work.here, 1), load_vector(work.here_j, 1)
-    climb_series(work, 0, z, carried)
+    climb_series(work, LOOSE, z, carried)
     end_at(work, k, carried)
-    store(work.f, k, product(p, load(work.event, 0)))
-    store_vector(work.h_j, k, plus(times(p, load_vector(work.event_j, 0)), p_j))
+    store(work.f, k, product(p, load(work.event, LOOSE)))
+    store_vector(work.h_j, k, plus(times(p, load_vector(work.event_j, LOOSE)), p_j))
     for c in range(carried.size):
         if carried[c]:
-            ahead = product(p, load(work.event_h[0], c))
+            ahead = product(p, load(work.event_h[LOOSE], c))
             store(work.h[k], c, add(ahead, load(work.here_h, c)))
     return flags

@@ -37,7 +37,7 @@ from ..compiled import compiled, compiled_apart, compiled_door
 from ..states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from .assemble import set_admittances
 from .breaks import FLOATING, NOTHING_S, SINGULAR, squared
-from .event_node import climb_event, climb_loose, cross, descend_event
+from .event_node import ABOVE, AT, BELOW, climb_event, climb_loose, cross, descend_event
 from .matrix3 import (
     ZERO,
     Matrix,
@@ -56,7 +56,7 @@ from .matrix3 import (
     times,
 )
 from .series import carry, carry_current, per_fork, up
-from .settle import is_linear, positive, update_magnitudes
+from .settle import is_linear, positive, see_magnitudes, update_magnitudes
 from .turns import turn_edge
 
 __all__ = ["solve_block"]
@@ -245,8 +245,8 @@ def descend(tree: Tree, state: State, work: Work, s: int) -> None:
         carried = tree.carried[k]
         if k == edge:
             v = descend_event(tree, work, 0, above, mask, carried)
-            v = plus(times(load(work.event, 2), v), load_vector(work.event_j, 2))
-            v = per_fork(work.event_h[2], carried, fork, v_all, v)
+            v = plus(times(load(work.event, BELOW), v), load_vector(work.event_j, BELOW))
+            v = per_fork(work.event_h[BELOW], carried, fork, v_all, v)
         else:
             v = times(load(f_all, k), above)
             if in_loop[k]:
@@ -277,12 +277,14 @@ def descend_chord_event(tree: Tree, work: Work, c: int, share: float, mask: int)
     tail, fork = tree.tail[c], tree.fork[c]
     near, far, side = (tail, fork, 0) if share <= 0.5 else (fork, tail, 1)
     v_far = load_vector(work.v, far)
-    v = plus(times(load(work.event, 0), load_vector(work.v, near)), load_vector(work.event_j, 0))
-    v = plus(v, times(load(work.event_h[0], c), v_far))
+    v = plus(
+        times(load(work.event, ABOVE), load_vector(work.v, near)), load_vector(work.event_j, ABOVE)
+    )
+    v = plus(v, times(load(work.event_h[ABOVE], c), v_far))
     store_vector(work.stub, side, v)
     if mask:
-        v = plus(times(load(work.event, 1), v), load_vector(work.event_j, 1))
-        v = plus(v, times(load(work.event_h[1], c), v_far))
+        v = plus(times(load(work.event, AT), v), load_vector(work.event_j, AT))
+        v = plus(v, times(load(work.event_h[AT], c), v_far))
     store_vector(work.stub, 1 - side, v)
 
 
@@ -366,8 +368,9 @@ def solve_block(
             if tree.lifted:
                 flags |= lift_neutral(tree, work)
             descend(tree, state, work, s)
-            change = update_magnitudes(tree, state, work, s, passes)
-            settled = linear or change <= tolerance_pu
+            settled = linear or update_magnitudes(tree, state, work, s, passes) <= tolerance_pu
+        if linear:
+            see_magnitudes(tree, state, work, s)
         answer.flags[s] = flags if settled else flags | NOT_CONVERGED
         answer.passes[s] = passes
         for m in range(tree.machine_unit.size):

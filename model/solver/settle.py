@@ -9,7 +9,7 @@ from ..compiled import compiled
 from ..states import State, Tree, Work
 from .matrix3 import Vector, load, load_vector, plus, times
 
-__all__ = ["is_linear", "positive", "update_magnitudes"]
+__all__ = ["is_linear", "positive", "see_magnitudes", "update_magnitudes"]
 
 Real = NDArray[np.float64]
 
@@ -46,6 +46,15 @@ def update_magnitudes(tree: Tree, state: State, work: Work, s: int, passes: int)
         history[0, n] = value
         history[1, n] = gap
     return change / largest
+
+
+@compiled
+def see_magnitudes(tree: Tree, state: State, work: Work, s: int) -> None:
+    """Take over the solved voltages where nothing depended on them."""
+    find_gaps(tree, state, work, s)
+    v_pu, gaps = work.winding_v_pu, work.history[2]
+    for n in range(v_pu.size):
+        v_pu[n] += gaps[n]
 
 
 @compiled
