@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from ... import __version__
 from ...model.errors import InputError, OpenPhaseError
 from ...model.parts import Feeder
-from ...model.reading.feeder_file import load_feeder
 from ...model.reading.toml_file import read_text
 from ...model.reading.toml_lines import locator
-from ...model.spread import spread_points
 from ...optimise.certificate import needed_trials, share_of_alpha
+from ..loading import load_with_points
 from ..spec.study_file import Study, check_study, default_study, own_study_file, read_study
 from .blocks import run_blocks
 from .cases import Case
@@ -90,11 +89,10 @@ def say(text: str) -> None:
 
 
 def read_feeder(name: str) -> Feeder:
-    """The feeder, with default points where it has none; InputError without any section."""
-    spread = spread_points(load_feeder(name))
-    for text in spread.said:
-        say(text)
-    feeder = spread.feeder
+    """The feeder, with default points where it has none; InputError where there is no section."""
+    feeder, said = load_with_points(name)
+    for text in said:
+        say(f"{feeder.name}: {text}")
     if not feeder.sections:
         raise InputError.single(feeder.name, "sections", "none", "must name at least one section")
     return feeder
