@@ -30,16 +30,19 @@ def a_case(seed: int, *, linear: bool = False) -> Case | None:
     loops = int(rng.choice([0, 1, 2, 3], p=[0.5, 0.2, 0.15, 0.15]))
     feeder = random_mixed_feeder(rng, int(rng.integers(3, 17)), loops, linear=linear)
     ties = [s.name for s in feeder.switches if not s.closed and rng.random() < 0.75]
-    closed = frozenset([s.name for s in feeder.switches if s.closed] + ties)
+    always = [s.name for s in feeder.switches if s.closed]
     opened = _opened(rng, feeder) if loops else frozenset()
-    if not _every_phase_is_fed(feeder, closed, opened):
-        opened = frozenset()
-    try:
-        network = compile_network(feeder, closed, opened)
-    except InputError:
-        return None
-    happening = random_happening(rng, feeder, network)
-    return Case(feeder=feeder, closed=closed, opened=opened, network=network, happening=happening)
+    for count in range(len(ties), -1, -1):
+        # a loop that the ladder refuses stays open
+        closed = frozenset(always + ties[:count])
+        own = opened if _every_phase_is_fed(feeder, closed, opened) else frozenset()
+        try:
+            network = compile_network(feeder, closed, own)
+        except InputError:
+            continue
+        happening = random_happening(rng, feeder, network)
+        return Case(feeder=feeder, closed=closed, opened=own, network=network, happening=happening)
+    return None
 
 
 def _every_phase_is_fed(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) -> bool:
@@ -107,7 +110,7 @@ def test_no_state_differs(sample: Sample) -> None:
 
 
 def test_hardly_any_feeder_is_refused(sample: Sample) -> None:
-    assert len(sample) >= 0.9 * FEEDERS
+    assert len(sample) >= 0.95 * FEEDERS
 
 
 def test_the_feeders_are_such_as_a_file_may_hold(sample: Sample) -> None:
