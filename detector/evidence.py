@@ -59,7 +59,7 @@ class Evidence:
     """
 
     di_a: Real  #: (T, R, S) |ΔI|
-    dv_pu: Real  #: (T, R, S) |ΔV| on nominal phase voltage
+    dv_pu: Real  #: (T, R, S) |ΔV| on the nominal phase voltage there
     z_ohm: Complex  #: (T, R, S) eq. (5); 0 where undefined
     undefined: Flags  #: (T, R, S) eq. (5) has no value
     blocked: Flags  #: (T, S) either end is dead, now or ΔT ago
@@ -90,7 +90,7 @@ class Evidence:
 
 
 def evidence_of(
-    phasors: Phasors, terminals: tuple[Terminal, ...], v_nominal_v: float, *options: Options
+    phasors: Phasors, terminals: tuple[Terminal, ...], v_nominal_v: float | Real, *options: Options
 ) -> Evidence:
     """Evidence of every directed terminal from what the points report.
 
@@ -99,8 +99,8 @@ def evidence_of(
     phasors : Phasors
     terminals : tuple of Terminal
         Where both ends are compared, both directions of each section.
-    v_nominal_v : float
-        Nominal phase voltage.
+    v_nominal_v : float or (P,) array
+        Nominal phase voltage, of all points or of each.
     *options : Options
         What will be judged with the evidence, ``Options()`` where none is given; what none of
         them asks for is not computed.
@@ -111,7 +111,8 @@ def evidence_of(
     if any(own.fallback for own in asked):
         v.append(phasors.v)
         i.append(phasors.i)
-    evidence = _base(v, i, terminals, _alive(phasors.v, v_nominal_v), v_nominal_v)
+    nominal = np.broadcast_to(np.asarray(v_nominal_v, np.float64), phasors.v.shape[1:2])
+    evidence = _base(v, i, terminals, _alive(phasors.v, nominal), nominal)
     if any(own.compensated or own.any_sequence for own in asked):
         evidence = _with_star(evidence, v, i, terminals)
     if any(own.any_sequence or own.unbalance > 0 or own.direction for own in asked):
@@ -146,7 +147,7 @@ def _base(
     i: list[Complex],
     terminals: tuple[Terminal, ...],
     alive: Flags,
-    v_nominal_v: float,
+    v_nominal_v: Real,
 ) -> Evidence:
     """The paper's quantities; ``v`` and ``i`` hold rows, (2, P, r, S) each."""
     local, remote = _ends(terminals)
@@ -169,7 +170,7 @@ def _base(
         )
         _look(volts, amperes, local, remote, into, own)
         stop = rows.stop
-    np.divide(seen.dv_pu, v_nominal_v, out=seen.dv_pu)
+    np.divide(seen.dv_pu, v_nominal_v[local, None, None], out=seen.dv_pu)
     return Evidence(
         di_a=seen.di_a,
         dv_pu=seen.dv_pu,
@@ -259,7 +260,7 @@ def _ends(terminals: tuple[Terminal, ...]) -> tuple[Int, Int]:
     return pairs[:, 0].copy(), pairs[:, 1].copy()
 
 
-def _alive(v: Complex, v_nominal_v: float) -> Flags:
+def _alive(v: Complex, v_nominal_v: Real) -> Flags:
     """(P, S): the highest phase voltage is up, now and ΔT ago."""
     squared = (v.real**2 + v.imag**2).max(axis=2)
-    return np.asarray((squared >= (DEAD_PU * v_nominal_v) ** 2).all(axis=0))
+    return np.asarray((squared >= ((DEAD_PU * v_nominal_v) ** 2)[:, None]).all(axis=0))

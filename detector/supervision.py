@@ -111,7 +111,7 @@ LIMITS = Limits()
 def wiring_alarm(
     phasors: Phasors,
     terminals: tuple[Terminal, ...],
-    v_nominal_v: float,
+    v_nominal_v: float | Real,
     one_way: Flags | None = None,
     limits: Limits = LIMITS,
 ) -> NDArray[np.int8]:
@@ -121,8 +121,8 @@ def wiring_alarm(
     ----------
     phasors : Phasors
     terminals : tuple of Terminal
-    v_nominal_v : float
-        Nominal phase voltage.
+    v_nominal_v : float or (P,) array
+        Nominal phase voltage, of all points or of each.
     one_way : (T,) bool array, optional
         Sections that are fed from one side alone, whichever (``fed_one_way``). By default none.
     limits : Limits, optional
@@ -132,17 +132,18 @@ def wiring_alarm(
     ValueError
         A terminal's other direction is not among ``terminals``.
     """
+    nominal = np.broadcast_to(np.asarray(v_nominal_v, np.float64), phasors.v.shape[1:2])
     v, i = phasors.v[0], phasors.i[0]
     far = reversed_terminals(terminals)
     if (far < 0).any():
         raise ValueError("wiring is judged by both ends: give both directions of each section")
-    live = (np.abs(v) >= limits.live_pu * v_nominal_v).all(axis=1)
+    live = (np.abs(v) >= limits.live_pu * nominal[:, None, None]).all(axis=1)
     v1 = positive_sequence(v)
     v2 = np.abs(negative_sequence(v))
     disordered = live & (v2 > np.abs(v1))
-    orderly = live & (v2 <= limits.unbalance_pu * v_nominal_v)
+    orderly = live & (v2 <= limits.unbalance_pu * nominal[:, None])
     turned, crossed = _turned(i, limits), _crossed(i, limits) & orderly[:, None]
-    active_a = (positive_sequence(i) * v1.conj()).real / v_nominal_v
+    active_a = (positive_sequence(i) * v1.conj()).real / nominal[:, None]
     alarm = np.zeros((len(terminals), v.shape[-1]), np.int8)
     for t, terminal in enumerate(terminals):
         if far[t] < t:  # the other direction of a section that is judged
@@ -164,8 +165,9 @@ def wiring_alarm(
             if not sure and found.any():
                 found = _balanced_by(mend, i[ends] * into[:, None, None], found, limits)
             alarm[t, found.any(axis=(0, 1))] = doubt
-        gap = np.abs(v1[ends[0]] - v1[ends[1]])
-        apart = gap > limits.apart_pu * np.abs(v1[ends]).max(axis=0)
+        ends_pu = v1[ends] / nominal[ends, None]
+        gap = np.abs(ends_pu[0] - ends_pu[1])
+        apart = gap > limits.apart_pu * np.abs(ends_pu).max(axis=0)
         alarm[t, apart & live[ends].all(axis=0)] = Alarm.ENDS_APART
         alarm[t, disordered[ends].any(axis=0)] = Alarm.PHASE_ORDER
     return alarm

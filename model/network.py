@@ -65,6 +65,8 @@ class Network:
     ratio_step: NDArray[np.float64]  #: (R,) what one tap adds to the voltage, lower over upper
     ratio_most: NDArray[np.int64]  #: (R,) taps to either side of neutral
     ratio_upward: NDArray[np.bool_]  #: (R,) the regulator's from-end is the upper one
+    ratio_phases: NDArray[np.int64]  #: (R,) bit mask of the phases that have a unit
+    ratio_gang: NDArray[np.bool_]  #: (R,) they step together
     equipped: NDArray[np.bool_]  #: (edges,) something is connected below the edge
     emf_pu: float
     three_wire: bool

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .line_matrices import z1_ohm
 from .network import Network, Piece, compile_network, detached_end
 from .parts import Feeder, Point, Section
-from .sides import sides_of
+from .path_impedance import Impedances, impedances_of, path_z1_ohm, rest_of_loop_z1_ohm
+from .sides import joined, sides_of
 from .states import Probes
-from .topology import edges, forest, tree_path
+from .topology import Edge, edges, shortest_path
 
 __all__ = ["Points", "Terminal", "find_points", "into_line", "point_probes"]
 
@@ -33,7 +35,7 @@ class Terminal:
     on_path: NDArray[np.bool_]  #: edges of the section's path: a break there is internal
     in_section: NDArray[np.bool_]  #: the path, and laterals that tee off it before the next point
     load_side: bool  #: with the section cut, nothing behind the terminal could feed it
-    line_z1_ohm: complex
+    line_z1_ohm: complex  #: of the path, as eq. (5) shows it
     loop_z1_ohm: complex | None  #: of the whole closed loop that the path is part of; None: none
     edge_side: NDArray[np.int8]  #: (edges,) a Side: how each edge lies to the section
     node_side: NDArray[np.int8]  #: (nodes,) and each node
@@ -50,6 +52,7 @@ class Points:
 
     names: tuple[str, ...]
     node: NDArray[np.int64]  #: (P,) where V is measured
+    v_nominal_v: NDArray[np.float64]  #: (P,) phase to earth there
     edge: NDArray[np.int64]  #: (P,) the line's edge at that end, where I is measured
     below: NDArray[np.bool_]  #: (P,) the point stands at the edge's lower end
     terminals: tuple[Terminal, ...]  #: both directions of every section, in the file's order
@@ -72,12 +75,16 @@ def find_points(feeder: Feeder, network: Network, opened: frozenset[str] = froze
     terminal would measure what enters it.
     """
     ends = [_end(feeder, network, p) for p in feeder.points]
-    terminals = []
-    for section in feeder.sections:
-        terminals += _terminals(feeder, network, section, opened)
+    node = [network.node(_voltage_node(p, opened)) for p in feeder.points]
+    terminals: list[Terminal] = []
+    if feeder.sections:
+        state = _state(feeder, network, opened)
+        for section in feeder.sections:
+            terminals += _terminals(state, section)
     return Points(
         names=tuple(p.name for p in feeder.points),
-        node=np.array([network.node(_voltage_node(p, opened)) for p in feeder.points], np.int64),
+        node=np.array(node, np.int64),
+        v_nominal_v=network.node_v[np.array(node, np.int64)],
         edge=np.array([edge for edge, _ in ends], np.int64),
         below=np.array([below for _, below in ends], np.bool_),
         terminals=tuple(terminals),
@@ -99,23 +106,60 @@ def _end(feeder: Feeder, network: Network, point: Point) -> tuple[int, bool]:
     return edge, bool(network.upward[edge] != at_from)
 
 
-def _terminals(
-    feeder: Feeder, network: Network, section: Section, opened: frozenset[str]
-) -> list[Terminal]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _State:
+    """A state of the network, and what all sections need to know of it and of the normal one."""
+
+    feeder: Feeder
+    network: Network
+    opened: frozenset[str]
+    normal: Network
+    graph: tuple[Edge, ...]  #: of the normal state
+    touching: Mapping[str, Sequence[Piece]]  #: its pieces at each node
+    impedances: Impedances
+    feeds: NDArray[np.int64]  #: nodes of the source and of DER with an EMF
+
+
+def _state(feeder: Feeder, network: Network, opened: frozenset[str]) -> _State:
+    normal = compile_network(feeder)
+    touching: defaultdict[str, list[Piece]] = defaultdict(list)
+    for piece in filter(None, normal.pieces):
+        for name in piece.ends:
+            touching[name].append(piece)
+    units = [
+        network.tree.machine_unit[len(network.machines.motor_load) + n]
+        for n, der in enumerate(feeder.ders)
+        if der.model in ("thevenin", "generator")
+    ]
+    return _State(
+        feeder=feeder,
+        network=network,
+        opened=opened,
+        normal=normal,
+        graph=edges(feeder),
+        touching=touching,
+        impedances=impedances_of(feeder, network),
+        feeds=np.append(network.tree.unit_node[np.array(units, np.int64)], 0),
+    )
+
+
+def _terminals(state: _State, section: Section) -> list[Terminal]:
     """Both terminals of a section."""
+    feeder, network = state.feeder, state.network
     points = {p.name: n for n, p in enumerate(feeder.points)}
     ends = [feeder.points[points[name]] for name in (section.local, section.remote)]
     # the path is that of the normal state, whatever is switched in this network
-    tree = forest(edges(feeder), [feeder.source.bus])[0]
-    _, path = tree_path(tree, ends[0].bus, ends[1].bus)
+    buses = ends[0].bus, ends[1].bus
+    _, path = shortest_path(state.graph, *buses, [point.line for point in ends])
     lines = {edge.name for edge in path if edge.is_line}
-    on_path = _edges_of_lines(network, lines)
-    in_section = on_path | _laterals(feeder, network, lines, ends)
-    z1 = sum((z1_ohm(feeder, li) for li in feeder.lines if li.name in lines), start=0j)
+    on_path = np.array([p is not None and p.line in lines for p in network.pieces], np.bool_)
+    in_section = on_path | _laterals(state, lines, ends)
     own_ends = {point.bus for point in ends if point.line in lines}
-    edge_side, node_side = sides_of(feeder, network, on_path, in_section, own_ends)
-    in_loop = np.append(network.tree.in_loop, np.ones(network.chords, np.bool_))
-    loop_z1 = _loop_z1(feeder, network, in_loop) if bool(in_loop[on_path].all()) else None
+    edge_side, node_side = sides_of(network, on_path, in_section, own_ends, state.normal)
+    steps = [(edge.name if edge.is_line else None, edge.ends) for edge in path]
+    z1 = path_z1_ohm(state.impedances, steps, buses)
+    rest = rest_of_loop_z1_ohm(state.impedances, network, on_path, buses)
+    fed = _fed(state, in_section)
     return [
         Terminal(
             local=here.name,
@@ -125,10 +169,9 @@ def _terminals(
             into=1.0 if here.line in lines else -1.0,
             on_path=on_path,
             in_section=in_section,
-            load_side=here.name in opened
-            or not _reaches_feed(feeder, network, network.node(here.bus), in_section),
+            load_side=here.name in state.opened or not fed[network.node(here.bus)],
             line_z1_ohm=z1,
-            loop_z1_ohm=loop_z1,
+            loop_z1_ohm=None if rest is None else z1 + rest,
             edge_side=edge_side,
             node_side=node_side,
         )
@@ -136,83 +179,52 @@ def _terminals(
     ]
 
 
-def _loop_z1(feeder: Feeder, network: Network, in_loop: NDArray[np.bool_]) -> complex:
-    """Positive-sequence impedance of all line in the closed loop."""
-    lines = {line.name: line for line in feeder.lines}
-    total = 0j
-    for k in np.flatnonzero(in_loop):
-        piece = network.pieces[k]
-        if piece is not None and piece.line is not None:
-            total += z1_ohm(feeder, lines[piece.line]) * (piece.stop - piece.start)
-    return total
-
-
-def _edges_of_lines(network: Network, lines: set[str]) -> NDArray[np.bool_]:
-    return np.array([p is not None and p.line in lines for p in network.pieces], np.bool_)
-
-
-def _laterals(
-    feeder: Feeder, network: Network, lines: set[str], ends: list[Point]
-) -> NDArray[np.bool_]:
+def _laterals(state: _State, lines: set[str], ends: list[Point]) -> NDArray[np.bool_]:
     """Edges that tee off the path between the two points, up to the next point."""
-    pieces = [p for p in compile_network(feeder).pieces if p is not None]
     # the bus of an end lies inside unless its point stands on the section's own side of it
     outer = {p.bus for p in ends if p.line in lines}
-    inner = {name for p in pieces if p.line in lines for name in p.ends} - outer
-    off_path = [p for p in pieces if p.line not in lines]
-    _, reached = _grow(off_path, inner, outer, ends)
-    if feeder.source.bus in reached:
+    along = [p for p in state.normal.pieces if p is not None and p.line in lines]
+    inner = {name for p in along for name in p.ends} - outer
+    feeder = state.feeder
+    _, reached = _grow(state.touching, lines, inner, ends)
+    if feeder.source.bus in reached or outer & reached:
         raise InputError.single(
             feeder.name,
             f"sections '{ends[0].name}'–'{ends[1].name}'",
-            "a way to the source that passes neither of them",
+            "a way out of it that passes neither of them"
+            if outer & reached
+            else "a way to the source that passes neither of them",
             "must be fed through its two points alone",
         )
-    found, _ = _grow(off_path, inner, outer, list(feeder.points))
-    return np.array([p is not None and p.key in found for p in network.pieces], np.bool_)
+    found, _ = _grow(state.touching, lines, inner, list(feeder.points))
+    return np.array([p is not None and p.key in found for p in state.network.pieces], np.bool_)
 
 
 def _grow(
-    pieces: list[Piece], inner: set[str], outer: set[str], points: list[Point]
+    touching: Mapping[str, Sequence[Piece]],
+    lines: set[str],
+    inner: set[str],
+    points: list[Point],
 ) -> tuple[set[object], set[str]]:
-    """Pieces and nodes that are joined to ``inner`` without passing any of ``points``."""
+    """Pieces off ``lines``, and nodes, that are joined to ``inner`` past none of ``points``."""
     guarded = {(p.bus, p.line) for p in points}
     found: set[object] = set()
     reached = set(inner)
     waiting = sorted(inner)
     while waiting:
         name = waiting.pop()
-        for piece in pieces:
-            if name not in piece.ends or (name, piece.line) in guarded:
+        for piece in touching[name]:
+            if piece.line in lines or (name, piece.line) in guarded:
                 continue
             found.add(piece.key)
             far = piece.ends[0] if piece.ends[1] == name else piece.ends[1]
-            if far not in reached and far not in outer and (far, piece.line) not in guarded:
+            if far not in reached and (far, piece.line) not in guarded:
                 reached.add(far)
                 waiting.append(far)
     return found, reached
 
 
-def _reaches_feed(feeder: Feeder, network: Network, node: int, cut: NDArray[np.bool_]) -> bool:
-    """Whether ``node`` is joined to the source, or to a DER with an EMF, without ``cut``."""
-    units = [
-        network.tree.machine_unit[len(network.machines.motor_load) + n]
-        for n, der in enumerate(feeder.ders)
-        if der.model in ("thevenin", "generator")
-    ]
-    feeds = {0, *(int(network.tree.unit_node[unit]) for unit in units)}
-    joined: list[tuple[int, int]] = [
-        (int(network.tree.parent[k]), k) for k in range(1, len(network.nodes)) if not cut[k]
-    ]
-    for c in range(network.chords):
-        if not cut[len(network.nodes) + c]:
-            joined.append((int(network.tree.fork[c]), int(network.tree.tail[c])))
-    reached = feeds
-    grown = True
-    while grown:
-        grown = False
-        for a, b in joined:
-            if (a in reached) != (b in reached):
-                reached |= {a, b}
-                grown = True
-    return node in reached
+def _fed(state: _State, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(nodes,) joined to the source, or to a DER with an EMF, without ``cut``."""
+    part = joined(state.network, ~cut)
+    return np.isin(part, part[state.feeds])

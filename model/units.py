@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .inline import regulator_ratio, regulator_reference
 from .machines import Machines, has_motor, load_va
 from .parts import Capacitor, Der, Feeder, Load, Source, Transformer
-from .phases import phase_rows
+from .phases import phase_mask, phase_rows
 from .pieces import Piece, node_name
 from .solver.bank import D_D, D_YG, Y_D, YG_D, YG_YG
 
@@ -184,6 +184,8 @@ def regulator_arrays(
         "ratio_step": np.array([r.step_pct / 100.0 for r in feeder.regulators], np.float64),
         "ratio_most": np.array([r.most_taps for r in feeder.regulators], np.int64),
         "ratio_upward": np.array(ways, np.bool_),
+        "ratio_phases": np.array([phase_mask(r.phases) for r in feeder.regulators], np.int64),
+        "ratio_gang": np.array([r.gang for r in feeder.regulators], np.bool_),
     }
 
 

@@ -3,45 +3,45 @@
 from __future__ import annotations
 
 import argparse
-import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..model.errors import InputError, OpenPhaseError
+from ..model.events.phases import count_phases
 from ..model.network import Network, assumed_connection, compile_network
-from ..model.parts import Der, Feeder, Load, Place, Regulator, Switch
+from ..model.parts import Der, Feeder, InlineTransformer, Load, Place, Regulator, Switch
 from ..model.points import Terminal, find_points
-from ..model.reading.feeder_file import load_feeder
+from ..model.sides import Side
 from ..model.reading.provenance import assumptions, count_origins
+from .loading import load_with_points
 from .run.store import as_json
-from .show.sheet import PAGE, wrapped
+from .show.check_text import check_text
 from .spec.study_file import Study, check_study, default_study
 
 __all__ = ["check_command", "summary"]
 
-LONG_LIST = 16  #: columns in which a list of names may run on below itself
-INSIDE = ("units", "ders", "capacitors", "regulators", "switches")  #: listed as inside a section
+SHIFTING = ("D/Yg", "D/Y", "Yg/D", "Y/D")  #: the phasors of either side stand 30 degrees apart
 
 
 def check_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code. Faults of the file have ended it before."""
-    feeder = load_feeder(args.feeder)
+    feeder, chosen = load_with_points(args.feeder)
     study = default_study(args.feeder)
     check_study(study, feeder, "study.toml")
-    found = summary(feeder, study)
+    found = summary(feeder, study, chosen)
     if args.plot:
         _plot(feeder, args.plot)
-    print(as_json(found) if args.json else _text(found), end="")
+    print(as_json(found) if args.json else check_text(found), end="")
     return 0
 
 
-def summary(feeder: Feeder, study: Study) -> dict[str, Any]:
-    """What ``check --json`` prints."""
+def summary(feeder: Feeder, study: Study, chosen: tuple[str, ...] = ()) -> dict[str, Any]:
+    """What ``check --json`` prints; ``chosen`` tells how the points came about, if by default."""
     network = compile_network(feeder)
     source = feeder.source
     found: dict[str, Any] = {
@@ -52,8 +52,11 @@ def summary(feeder: Feeder, study: Study) -> dict[str, Any]:
         "neutral": source.neutral,
         "neutral_ohm": [source.neutral_ohm.real, source.neutral_ohm.imag],
         "line_km": float(network.length_km.sum()),
+        "line_km_by_phases": _km_by_phases(network, network.length_km > 0),
         "load_kw": sum(load.kw for load in feeder.loads),
         "points": [point.name for point in feeder.points],
+        "points_kv_ll": _kv_at_points(feeder, network),
+        "points_by_default": list(chosen),
         "sections": [],
         "loop": [switch.name for switch in feeder.switches if not switch.closed],
         "ders": [{"name": d.name, "kw": d.kw, "model": d.model} for d in feeder.ders],
@@ -61,6 +64,10 @@ def summary(feeder: Feeder, study: Study) -> dict[str, Any]:
             {"name": c.name, "kvar": c.kvar, "connection": c.connection} for c in feeder.capacitors
         ],
         "regulators": [{"name": r.name, "taps": list(r.taps)} for r in feeder.regulators],
+        "inline_transformers": [
+            {"name": t.name, "connection": t.connection, "kv": [t.kv_from, t.kv_to]}
+            for t in feeder.inline_transformers
+        ],
         "values": count_origins(feeder),
         "assumed": [*_assumed(feeder), *assumptions(feeder)],
     }
@@ -88,10 +95,15 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "remote": terminal.remote,
         "length_km": float(network.length_km[terminal.on_path].sum()),
         "line_z1_ohm": [terminal.line_z1_ohm.real, terminal.line_z1_ohm.imag],
+        "laterals_km_by_phases": _km_by_phases(network, terminal.in_section & ~terminal.on_path),
         "downstream_kw": [far * level[0] * each[0], near * level[1] * each[1]],
         "downstream_kw_nominal": [far, near],
         "units": [unit.name for unit in units],
-        "yg_d": [unit.name for unit in units if unit.connection == "Yg/D"],
+        "yg_d": [
+            unit.name
+            for unit in (*units, *filter(inside.joins, feeder.inline_transformers))
+            if unit.connection == "Yg/D"
+        ],
         "yg_d_sampled": [unit.name for unit in units if unit.name in study.transformers.yg_d],
         # on three wires an unknown unit has no neutral to be Yg by
         "yg_d_unknown": [
@@ -100,6 +112,12 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "loads": hanging(feeder.loads),
         "ders": hanging(feeder.ders),
         "capacitors": [bank.name for bank in feeder.capacitors if inside.holds(bank.place)],
+        "inline_transformers": [p.name for p in feeder.inline_transformers if inside.joins(p)],
+        "shifted_by": [
+            p.name
+            for p in feeder.inline_transformers
+            if inside.joins(p) and p.connection in SHIFTING
+        ],
         "regulators": [part.name for part in feeder.regulators if inside.joins(part)],
         "switches": [part.name for part in feeder.switches if part.closed and inside.joins(part)],
     }
@@ -123,7 +141,7 @@ class _Inside:
             return self.ends[place.line][int(place.at)] in self.buses
         return place.line in self.lines
 
-    def joins(self, part: Switch | Regulator) -> bool:
+    def joins(self, part: Switch | Regulator | InlineTransformer) -> bool:
         return {part.from_bus, part.to_bus} <= self.buses
 
 
@@ -143,18 +161,37 @@ def _inside(feeder: Feeder, network: Network, terminal: Terminal) -> _Inside:
     return _Inside(lines=lines, buses=frozenset(touched - outer), ends=ends)
 
 
+def _kv_at_points(feeder: Feeder, network: Network) -> list[float]:
+    """Nominal voltages between phases at which points stand, rising."""
+    volts = {network.node_v[network.node(point.bus)] for point in feeder.points}
+    return sorted(round(float(v) * 3.0**0.5 / 1000.0, 6) for v in volts)
+
+
+def _km_by_phases(network: Network, chosen: NDArray[np.bool_]) -> list[float]:
+    """Length of the chosen edges with one, two and three phases."""
+    count = count_phases(network.tree.phases)
+    return [float(network.length_km[chosen & (count == n)].sum()) for n in (1, 2, 3)]
+
+
 def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: bool) -> float:
-    """Nominal kW of load beyond the section's first edge, or beyond its last."""
+    """Nominal kW of load beyond the section's first edge, or beyond its last.
+
+    Where loops are closed, that which the source reaches over the section alone.
+    """
     path = [int(k) for k in np.flatnonzero(terminal.on_path)]
-    edge = min(path) if nearest else max(path)
-    loaded = network.below(edge)[network.load_node]
+    below = network.below(min(path) if nearest else max(path))
+    if network.chords:
+        below = terminal.node_side == Side.DOWNSTREAM
+        below |= nearest & (terminal.node_side == Side.LATERAL)
+    loaded = below[network.load_node]
     return float(sum(load.kw for load, own in zip(feeder.loads, loaded, strict=True) if own))
 
 
 def _assumed(feeder: Feeder) -> list[str]:
     """What the model takes for granted about any feeder."""
     said = [
-        "lines are transposed; loads, DER and capacitors are balanced over three phases",
+        "lines without a code are transposed; what hangs behind transformers is balanced, and so "
+        "are DER",
         "downstream kW: nominal times the study's load range, at the section's far and near end",
     ]
     if any(unit.connection == "unknown" for unit in feeder.transformers):
@@ -162,7 +199,7 @@ def _assumed(feeder: Feeder) -> list[str]:
             "transformers of unknown connection are drawn by a study; until then they count as "
             f"{assumed_connection(feeder.source)}"
         )
-    if any(line.z0_ohm_per_km == line.z1_ohm_per_km for line in feeder.lines):
+    if any(li.code is None and li.z0_ohm_per_km == li.z1_ohm_per_km for li in feeder.lines):
         said.append("some lines have z0 = z1 (given so): overhead lines have z0 ≈ 3 z1")
     return said
 
@@ -172,6 +209,8 @@ def _plot(feeder: Feeder, path: Path) -> None:
     from .show.feeder_plot import plot_feeder  # noqa: PLC0415
     from .show.figures import save_figure  # noqa: PLC0415
 
+    if path == Path():  # --plot without a file
+        path = Path(f"{feeder.name}.png")
     if path.suffix.lower() not in (".png", ".svg"):
         raise InputError.single("--plot", "", path.name, "must end in .png or .svg")
     figure = plot_feeder(feeder).get_figure()
@@ -180,100 +219,3 @@ def _plot(feeder: Feeder, path: Path) -> None:
     except OSError as error:
         reason = error.strerror or str(error)
         raise OpenPhaseError(f"{path}: the picture cannot be written: {reason}") from error
-
-
-def _text(found: dict[str, Any]) -> str:
-    """The summary for people, in 100 columns."""
-    lines = [
-        *wrapped(
-            f"{found['feeder']}: no faults; {found['kv_ll']:g} kV, {found['wires']} wires, "
-            f"neutral {found['neutral']}, {found['line_km']:g} km of line, "
-            f"{found['load_kw']:g} kW, {len(found['points'])} measuring points"
-        ),
-        "",
-        *(_sections(found["sections"]) or ["no sections: nothing to size"]),
-        *(["?: the connection is unknown"] if _any_unknown(found["sections"]) else []),
-        "",
-        *_elements(found),
-        *wrapped(_values(found)),
-        "assumed:",
-    ]
-    for text in found["assumed"]:
-        lines += wrapped(f"- {text}")
-    return "\n".join(lines) + "\n"
-
-
-def _any_unknown(sections: list[dict[str, Any]]) -> bool:
-    return any(row["yg_d_unknown"] for row in sections)
-
-
-def _elements(found: dict[str, Any]) -> list[str]:
-    """What stands on the feeder beside lines, loads and transformers, and in which section."""
-    parts = {
-        "ties, normally open": found["loop"],
-        "DER": [f"{d['name']} ({d['kw']:g} kW, {d['model']})" for d in found["ders"]],
-        "capacitors": [
-            f"{c['name']} ({c['kvar']:g} kvar, {c['connection']})" for c in found["capacitors"]
-        ],
-        "regulators": [
-            f"{r['name']} (taps {', '.join(f'{tap:+d}' if tap else '0' for tap in r['taps'])})"
-            for r in found["regulators"]
-        ],
-    }
-    lines = []
-    for what, names in parts.items():
-        lines += wrapped(f"{what}: {', '.join(names) or 'none'}")
-    for row in found["sections"]:
-        if row["regulators"]:
-            lines += wrapped(
-                f"note: inside {row['local']}–{row['remote']} the taps of "
-                f"{', '.join(row['regulators'])} may change, which looks like an open phase"
-            )
-    return lines
-
-
-def _values(found: dict[str, Any]) -> str:
-    """How many values come from where."""
-    counts = ", ".join(f"{count} {origin}" for origin, count in found["values"].items() if count)
-    source = found["imported_from"]
-    return f"values: {counts}{f' (from {source})' if source else ''}"
-
-
-def _sections(rows: list[dict[str, Any]]) -> list[str]:
-    """The table of the sections; none where there is no section."""
-    if not rows:
-        return []
-    cells = [["section", "km", "|Z1| Ω", "downstream kW", "Yg/D known", "Yg/D possible", "inside"]]
-    for row in rows:
-        low, high = row["downstream_kw"]
-        cells.append(
-            [
-                f"{row['local']}–{row['remote']}",
-                f"{row['length_km']:g}",
-                f"{abs(complex(*row['line_z1_ohm'])):.3f}",
-                f"{low:.0f} .. {high:.0f}",
-                ", ".join(row["yg_d"]) or "-",
-                ", ".join([*row["yg_d_sampled"], *(f"{n}?" for n in row["yg_d_unknown"])]) or "-",
-                ", ".join(name for kind in INSIDE for name in row[kind]) or "-",
-            ]
-        )
-    wide = [max(len(line[n]) for line in cells) for n in range(7)]
-    # long names stand above their row, long lists run on below themselves
-    wide[4:6] = [min(w, LONG_LIST) for w in wide[4:6]]
-    beside = sum(wide[:6]) + 2 * 6 + min(wide[6], LONG_LIST) <= PAGE
-    if not beside:
-        wide[0] = 0
-    wide[6] = min(wide[6], PAGE - sum(wide[:6]) - 2 * 6)
-    lines = []
-    for name, *rest in cells:
-        if not beside:
-            lines += wrapped(name)
-        parts = [[name if beside else ""], *([text] for text in rest[:3])]
-        parts += [textwrap.wrap(text, w) for text, w in zip(rest[3:], wide[4:], strict=True)]
-        for own in zip_longest(*parts, fillvalue=""):
-            padded = (
-                f"{text:>{w}}" if n in (1, 2, 3) else f"{text:<{w}}"
-                for n, (text, w) in enumerate(zip(own, wide, strict=True))
-            )
-            lines.append("  ".join(padded).rstrip())
-    return lines

@@ -151,7 +151,14 @@ def _verb_table() -> str:
 
 def _check_arguments(parser: argparse.ArgumentParser) -> None:
     _add_feeder(parser)
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the feeder into FILE")
+    parser.add_argument(
+        "--plot",
+        type=Path,
+        nargs="?",
+        const=Path(),
+        metavar="FILE",
+        help="draw the feeder into FILE (default: FEEDER's name with .png, in this folder)",
+    )
     _add_json(parser)
     parser.set_defaults(handler=_check)
 

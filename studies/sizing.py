@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..model.parts import Feeder
 from ..optimise.thresholds import Refusal
 from .run.blocks import run_blocks
@@ -94,7 +96,9 @@ def size_feeder(feeder: Feeder, study: Study, demand: Demand, out: Path) -> Sizi
     validations = validate(cases, rivals, attempt, folder, demand.jobs)
     watch.lap("validate_s")
     sheets = sheets_of(cases, validations, attempt.number, chosen=True)
-    answer = answer_head(cases, attempt) | certified(sheets, given, rivals)
+    answer = answer_head(cases, attempt) | certified(
+        sheets, given, rivals, np.sum([own.flags for own in trainings], axis=0)
+    )
     sizing = Sizing(result=answer, cases=cases, trainings=trainings, validations=validations)
     folder.write("result.json", as_json(answer))
     folder.write("settings.csv", settings_csv(answer))

@@ -18,11 +18,11 @@ from ..model.errors import Fault, InputError, OpenPhaseError, Report
 from ..model.network import Network, compile_network, locate
 from ..model.parts import Feeder
 from ..model.points import Points, find_points, into_line
-from ..model.reading.feeder_file import load_feeder
 from ..model.reading.fields import did_you_mean
 from ..model.solve import solve, steady_state
 from ..model.solver.breaks import FLOATING, UNDEFINED
 from ..model.states import NOT_CONVERGED, Answer
+from .loading import load_with_points
 from .run.store import as_json
 from .settings_file import read_settings
 
@@ -49,7 +49,9 @@ class Break:
 
 def solve_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code."""
-    feeder = load_feeder(args.feeder)
+    feeder, chosen = load_with_points(args.feeder)
+    for text in chosen:
+        print(f"{feeder.name}: {text}", file=sys.stderr)
     broken, closed, settings = _read_all(args, feeder)
     print("solving; the solver is compiled at first use …", file=sys.stderr, flush=True)
     answer = solve_break(feeder, broken, closed, settings)
@@ -239,7 +241,7 @@ def _sections(
     judged = [own.options for own in settings.values() if own is not None]
     shown = Options(fallback=True, compensated=True)
     evidence = evidence_of(
-        _phasors(points, frames), points.terminals, network.tree.v_nominal_v, shown, *judged
+        _phasors(points, frames), points.terminals, points.v_nominal_v, shown, *judged
     )
     rows = []
     for t, terminal in enumerate(points.terminals):

@@ -145,6 +145,7 @@ DOCUMENTED = [
     ("`compared`", RUNS, "compared"),
     ("`feeder_false_trips`", RUNS, "feeder_false_trips"),
     ("`numerics`", RUNS, "numerics"),
+    ("`numerics.by_class`", RUNS, "numerics.by_class"),
     ("`compare`", COMPARED, ""),
     ("`runs`", COMPARED, "runs"),
     ("`comparisons`", COMPARED, "comparisons"),

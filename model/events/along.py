@@ -21,7 +21,7 @@ def draw_node(
     """(S,) the nodes nearest to places drawn as for any other event."""
     edge, share = draw_place(rng, size, regions)
     tree = network.tree
-    # the chord, the last edge, is no node's own: it leads from the tail to the fork
+    # chords, the last edges, are no node's own: they lead from tails to forks
     upper = np.append(tree.parent, tree.tail)[edge]
     lower = np.append(np.arange(tree.parent.size), tree.fork)[edge]
     return np.where(share < 0.5, upper, lower)

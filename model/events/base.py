@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..network import Network
 from ..states import State
+from .phases import count_phases
 
 __all__ = ["Event", "Places", "apply_event", "draw_place", "no_event", "places_on"]
 
@@ -69,9 +70,14 @@ class Places:
         return self.edges[pick], np.clip(share, 0.0, 1.0)
 
 
-def places_on(network: Network, chosen: NDArray[np.bool_] | None = None) -> Places:
-    """All line edges of the network, or those where ``chosen`` (edges,) is True."""
-    wanted = network.length_km > 0
+def places_on(
+    network: Network, chosen: NDArray[np.bool_] | None = None, least_phases: int = 1
+) -> Places:
+    """All line edges of the network, or those where ``chosen`` (edges,) is True.
+
+    Lines of fewer than ``least_phases`` are left out.
+    """
+    wanted = (network.length_km > 0) & (count_phases(network.tree.phases) >= least_phases)
     if chosen is not None:
         wanted = wanted & chosen
     edges = np.flatnonzero(wanted)

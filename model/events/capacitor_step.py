@@ -10,7 +10,7 @@ import numpy as np
 from ..distributions import Distribution
 from ..network import Network
 from .base import Event, Places, draw_place, no_event
-from .shunts import between_phases, each_way, put, to_earth, where
+from .shunts import between_phases, each_way, put, spot_on, to_earth, where
 
 __all__ = ["draw_capacitor_step"]
 
@@ -26,11 +26,12 @@ def draw_capacitor_step(
     """A balanced bank of ``kvar``, on or off as likely; every region as likely.
 
     It is a delta with probability ``delta_share``, and always on three wires; a grounded wye
-    otherwise.
+    otherwise. ``regions`` are of three-phase lines.
     """
     edge, share = draw_place(rng, size, regions)
     each = np.tile(-1j * kvar.draw(rng, size) * 1000.0 / 3.0, (3, 1))
     delta = (rng.random(size) < delta_share) | network.three_wire
-    bank = where(delta, between_phases(network, each), to_earth(network, each))
+    spot = spot_on(network, edge)
+    bank = where(delta, between_phases(spot, each), to_earth(spot, each))
     before, after = each_way(rng, bank)
     return put(replace(no_event(network, size), edge=edge, share=share), before, after)

@@ -1,4 +1,4 @@
-"""A part of the feeder that was dead is energised: all three phases close at once."""
+"""A part of the feeder that was dead is energised: all its phases close at once."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from ..network import Network
 from .along import fed_through
 from .base import Event, Places, draw_place, no_event
 from .der_units import der_nodes
-from .open_phase import THREE_PHASES
 
 __all__ = ["draw_energisation"]
 
@@ -19,7 +18,7 @@ __all__ = ["draw_energisation"]
 def draw_energisation(
     rng: np.random.Generator, size: int, network: Network, regions: Sequence[Places]
 ) -> Event:
-    """Three phases close somewhere on a line; every region is as likely.
+    """All phases of a line close somewhere on it; every region is as likely.
 
     What is beyond takes at once what it took when the network was whole; magnetizing inrush
     is not modelled. DER beyond stay disconnected: they wait for a steady voltage first.
@@ -30,6 +29,6 @@ def draw_energisation(
         no_event(network, size),
         edge=edge,
         share=share,
-        open_before=np.full(size, THREE_PHASES, np.int64),
+        open_before=network.tree.phases[edge],
         der_factor=np.where(dead, 0.0, 1.0),
     )

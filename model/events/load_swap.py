@@ -6,12 +6,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..distributions import Distribution
 from ..network import Network
 from .along import draw_node
 from .base import Event, Places, draw_place, no_event
-from .shunts import each_way, load, no_shunt, phase_shares, put, put_far, where
+from .phases import count_phases
+from .shunts import (
+    Spot,
+    each_way,
+    load,
+    no_shunt,
+    phase_shares,
+    put,
+    put_far,
+    spot_at,
+    spot_on,
+    where,
+)
 
 __all__ = ["LoadSwapLaw", "draw_load_swap"]
 
@@ -22,7 +35,7 @@ class LoadSwapLaw:
 
     kw: Distribution  #: of the first at nominal voltage, all phases together
     ratio: Distribution  #: of the second to the first; negative: it goes the other way
-    single_phase_share: float  #: on one phase, the same for both; the rest are balanced
+    single_phase_share: float  #: on one phase, the same if both places have it; the rest balanced
 
 
 def draw_load_swap(
@@ -39,13 +52,28 @@ def draw_load_swap(
     """
     edge, share = draw_place(rng, size, regions)
     node = draw_node(rng, size, network, regions)
-    watts = law.kw.draw(rng, size) * 1000.0 * phase_shares(rng, size, law.single_phase_share)
+    near, far, apart = _common(spot_on(network, edge), spot_at(network, node))
+    watts = law.kw.draw(rng, size) * 1000.0
+    shares = phase_shares(rng, near, law.single_phase_share)
     ratio = law.ratio.draw(rng, size)
-    before, after = each_way(rng, load(network, watts.astype(np.complex128)))
-    far = load(network, (np.abs(ratio) * watts).astype(np.complex128))
+    before, after = each_way(rng, load(near, (watts * shares).astype(np.complex128)))
+    if apart.any():
+        shares = np.where(apart, phase_shares(rng, far, law.single_phase_share), shares)
+    there = load(far, (np.abs(ratio) * watts * shares).astype(np.complex128))
     # the second step is there after the event where the first is, or where it is not
     stays = after.earth_s.any(axis=0) | after.between_s.any(axis=0)
     stays ^= ratio < 0.0
     nothing = no_shunt(size)
     event = put(replace(no_event(network, size), edge=edge, share=share), before, after)
-    return put_far(event, node, where(stays, nothing, far), where(stays, far, nothing))
+    return put_far(event, node, where(stays, nothing, there), where(stays, there, nothing))
+
+
+def _common(near: Spot, far: Spot) -> tuple[Spot, Spot, NDArray[np.bool_]]:
+    """Both with the phases that both have, but where (S,) they have none in common to load."""
+    both = near.phases & far.phases
+    apart = np.where(near.between | far.between, count_phases(both) < 2, both == 0)
+    return (
+        replace(near, phases=np.where(apart, near.phases, both)),
+        replace(far, phases=np.where(apart, far.phases, both)),
+        apart,
+    )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..distributions import Distribution
 from ..network import Network
 from .base import Event, Places, draw_place, no_event
-from .shunts import Shunt, between_phases, no_shunt, put, where
+from .shunts import Shunt, Spot, between_phases, no_shunt, put, spot_on, where
 
 __all__ = ["RUNNING_POWER_FACTOR", "MotorStartLaw", "draw_motor_start"]
 
@@ -38,13 +38,15 @@ def draw_motor_start(
 
     A motor has no neutral, and at standstill the same impedance to either rotation of the
     field: a balanced delta. A start is long against the time between two frames, so its
-    begin and its end are events of their own. Every region is as likely.
+    begin and its end are events of their own. Every region is as likely; they are of
+    three-phase lines.
     """
     edge, share = draw_place(rng, size, regions)
     va = law.kva.draw(rng, size) * 1000.0
     times = law.times.draw(rng, size)
-    starting = _motor(network, va * times, law.power_factor.draw(rng, size))
-    running = _motor(network, va, np.full(size, RUNNING_POWER_FACTOR))
+    spot = spot_on(network, edge)
+    starting = _motor(spot, va * times, law.power_factor.draw(rng, size))
+    running = _motor(spot, va, np.full(size, RUNNING_POWER_FACTOR))
     runs_up = rng.random(size) < 0.5
     return put(
         replace(no_event(network, size), edge=edge, share=share),
@@ -53,6 +55,6 @@ def draw_motor_start(
     )
 
 
-def _motor(network: Network, va: NDArray[np.float64], power_factor: NDArray[np.float64]) -> Shunt:
+def _motor(spot: Spot, va: NDArray[np.float64], power_factor: NDArray[np.float64]) -> Shunt:
     drawn = va * (power_factor + 1j * np.sqrt(1.0 - power_factor**2))
-    return between_phases(network, np.tile(drawn / 3.0, (3, 1)))
+    return between_phases(spot, np.tile(drawn / 3.0, (3, 1)))

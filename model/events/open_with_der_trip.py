@@ -11,7 +11,7 @@ from ..distributions import Distribution
 from ..network import Network
 from .base import Event, Places, draw_place, no_event
 from .der_units import draw_tripped
-from .open_phase import draw_phases
+from .phases import draw_mask
 
 __all__ = ["draw_open_with_der_trip"]
 
@@ -30,7 +30,7 @@ def draw_open_with_der_trip(
     network without DER.
     """
     edge, along = draw_place(rng, size, regions)
-    mask = draw_phases(rng, size, two_phase_share)
+    mask = draw_mask(rng, network.tree.phases[edge], two_phase_share)
     _, tripped = draw_tripped(rng, size, network, share)
     return replace(
         no_event(network, size),

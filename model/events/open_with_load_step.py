@@ -11,8 +11,8 @@ from ..distributions import Distribution
 from ..network import Network
 from .along import draw_node
 from .base import Event, Places, draw_place, no_event
-from .open_phase import draw_phases
-from .shunts import each_way, load, phase_shares, put_far
+from .phases import draw_mask
+from .shunts import each_way, load, phase_shares, put_far, spot_at
 
 __all__ = ["OpenWithLoadStepLaw", "draw_open_with_load_step"]
 
@@ -38,10 +38,11 @@ def draw_open_with_load_step(
     It is constant impedance at unity power factor. For either place every region is as likely.
     """
     edge, share = draw_place(rng, size, regions)
-    mask = draw_phases(rng, size, law.two_phase_share)
+    mask = draw_mask(rng, network.tree.phases[edge], law.two_phase_share)
     event = replace(no_event(network, size), edge=edge, share=share, open_after=mask)
     node = draw_node(rng, size, network, regions)
     watts = law.kw.draw(rng, size) * 1000.0
-    shares = phase_shares(rng, size, law.single_phase_share)
-    before, after = each_way(rng, load(network, (shares * watts).astype(np.complex128)))
+    spot = spot_at(network, node)
+    shares = phase_shares(rng, spot, law.single_phase_share)
+    before, after = each_way(rng, load(spot, (shares * watts).astype(np.complex128)))
     return put_far(event, node, before, after)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..distributions import Distribution
 from ..network import Network
 from .base import Event, no_event
-from .shunts import one_of_three
+from .phases import draw_phase, row_flags
 
 __all__ = ["draw_regulator_tap"]
 
@@ -22,17 +22,20 @@ def draw_regulator_tap(
     taps: Distribution,
     single_phase_share: float,
 ) -> Event:
-    """One regulator moves by ``taps``: one phase that often, else all three alike.
+    """One regulator moves by ``taps``: one phase that often, else all that it has alike.
 
-    Every regulator is as likely; the event is at its edge. Raises ValueError for a network
-    without regulators.
+    Every regulator is as likely, and every phase of it; those that step together always do. The
+    event is at its edge. Raises ValueError for a network without regulators.
     """
     count = len(network.regulators)
     if count == 0:
         raise ValueError("regulator taps: the network has 0 regulators, wanted at least 1")
     which = rng.integers(count, size=size)
     moves = taps.draw(rng, size)
-    phase = one_of_three(rng, size) | (rng.random(size) >= single_phase_share)
+    there = network.ratio_phases[which]
+    phase = row_flags(draw_phase(rng, there))
+    together = (rng.random(size) >= single_phase_share) | network.ratio_gang[which]
+    phase |= together & (there >> np.arange(3)[:, None] & 1 > 0)
     moved = phase & (which == np.arange(count)[:, None, None])
     edges = np.array([np.flatnonzero(network.tree.regulator == r)[0] for r in range(count)])
     return replace(

@@ -9,27 +9,68 @@ from numpy.typing import NDArray
 
 from ..network import Network
 from .base import Event
+from .phases import THREE_PHASES, count_phases, draw_pair, draw_phase, row_flags
 
 __all__ = [
     "LEAST_OHM",
     "Shunt",
+    "Spot",
     "between_phases",
     "each_way",
     "load",
     "no_shunt",
-    "one_of_three",
     "phase_shares",
     "put",
     "put_far",
+    "spot_at",
+    "spot_on",
     "to_earth",
     "where",
 ]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 LEAST_OHM = 1e-3  #: what a bolted fault counts as: an admittance must be finite
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spot:
+    """What there is to connect something to, in each of S scenarios."""
+
+    phases: Int  #: (S,) masks of the phases
+    v_nominal_v: Real  #: (S,) phase to earth
+    three_wire: bool
+
+    @property
+    def between(self) -> Bool:
+        """(S,) loads lie between phases: there is no neutral, and a second phase.
+
+        One conductor alone returns through the earth, whatever feeds it.
+        """
+        return np.asarray(self.three_wire & (count_phases(self.phases) > 1))
+
+
+def spot_on(network: Network, edge: Int) -> Spot:
+    """The lines on which the events stand, (S,) edges."""
+    # a line has the nominal voltage of either end
+    lower = np.append(np.arange(len(network.nodes)), network.tree.tail)[edge]
+    return Spot(
+        phases=network.tree.phases[edge],
+        v_nominal_v=network.node_v[lower],
+        three_wire=network.three_wire,
+    )
+
+
+def spot_at(network: Network, node: Int) -> Spot:
+    """The nodes of second places, (S,)."""
+    return Spot(
+        phases=network.node_phases[node],
+        v_nominal_v=network.node_v[node],
+        three_wire=network.three_wire,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,21 +87,21 @@ def no_shunt(size: int) -> Shunt:
     return Shunt(earth_s=nothing, between_s=nothing)
 
 
-def to_earth(network: Network, va: Complex) -> Shunt:
+def to_earth(spot: Spot, va: Complex) -> Shunt:
     """Grounded wye: ``va`` (3, S) is P + jQ of each phase at nominal voltage."""
-    y = va.conj() / network.tree.v_nominal_v**2
+    y = va.conj() / spot.v_nominal_v**2
     return Shunt(earth_s=y, between_s=np.zeros_like(y))
 
 
-def between_phases(network: Network, va: Complex) -> Shunt:
+def between_phases(spot: Spot, va: Complex) -> Shunt:
     """Delta: ``va`` (3, S) is P + jQ between a-b, b-c, c-a at nominal voltage."""
-    y = va.conj() / (3.0 * network.tree.v_nominal_v**2)
+    y = va.conj() / (3.0 * spot.v_nominal_v**2)
     return Shunt(earth_s=np.zeros_like(y), between_s=y)
 
 
-def load(network: Network, va: Complex) -> Shunt:
+def load(spot: Spot, va: Complex) -> Shunt:
     """``va`` (3, S) from each phase to the neutral, or, without one, from each to the next."""
-    return between_phases(network, va) if network.three_wire else to_earth(network, va)
+    return where(spot.between, between_phases(spot, va), to_earth(spot, va))
 
 
 def where(chosen: Bool, one: Shunt, other: Shunt) -> Shunt:
@@ -101,13 +142,13 @@ def put_far(event: Event, node: NDArray[np.int64], before: Shunt, after: Shunt) 
     )
 
 
-def one_of_three(rng: np.random.Generator, size: int) -> Bool:
-    """(3, S) True for one phase of each scenario, every phase as likely."""
-    return np.asarray(rng.integers(3, size=size) == np.arange(3)[:, None])
+def phase_shares(rng: np.random.Generator, spot: Spot, single_phase_share: float) -> Real:
+    """(3, S) shares of a load: all of it on one phase that often, else a third on each.
 
-
-def phase_shares(rng: np.random.Generator, size: int, single_phase_share: float) -> Real:
-    """(3, S) shares of a load: all of it on one phase that often, else a third on each."""
-    alone = one_of_three(rng, size)
-    single = rng.random(size) < single_phase_share
-    return np.where(single, alone, 1.0 / 3.0)
+    Where there are fewer than three phases, it is on one always. Rows are phases, or pairs of
+    them where ``spot.between``.
+    """
+    pairs = draw_pair if spot.three_wire else draw_phase
+    alone = row_flags(pairs(rng, spot.phases))
+    single = rng.random(spot.phases.size) < single_phase_share
+    return np.where(single | (spot.phases != THREE_PHASES), alone, 1.0 / 3.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..network import Network
 from .base import Event, Places, draw_place, no_event
-from .open_phase import draw_phases
+from .phases import draw_mask
 
 __all__ = ["draw_single_pole"]
 
@@ -26,5 +26,5 @@ def draw_single_pole(
     Only closings: a pole that opens is an open phase, electrically and in ``open_phase``.
     """
     edge, share = draw_place(rng, size, regions)
-    mask = draw_phases(rng, size, two_phase_share)
+    mask = draw_mask(rng, network.tree.phases[edge], two_phase_share)
     return replace(no_event(network, size), edge=edge, share=share, open_before=mask)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..network import compile_network
 from ..solve import solve, steady_state
 from ..states import NOT_CONVERGED
-from .dss_engine import solved_volts, tell
+from .dss_apart import Volts, solve_apart
 from .dss_feeder import Imported
 from .unearthed import unearthed_buses
 
@@ -51,8 +51,9 @@ class Difference:
 
 def differences(imported: Imported) -> tuple[Difference, ...]:
     """Solve the feeder here and in OpenDSS, its controls off, and compare every node."""
-    tell(imported.engine, _as_imported(imported))
-    return tuple(_difference(imported, mode) for mode in _MODES)
+    source = imported.feeder.imported_from or ""
+    theirs = solve_apart(imported.script, source, list(_as_imported(imported)), _MODES)
+    return tuple(_difference(imported, mode, theirs[mode]) for mode in _MODES)
 
 
 def _as_imported(imported: Imported) -> Iterator[str]:
@@ -67,7 +68,7 @@ def _as_imported(imported: Imported) -> Iterator[str]:
         yield f'Edit "Capacitor.{bank.name}" States=[{states}]'
 
 
-def _difference(imported: Imported, mode: str) -> Difference:
+def _difference(imported: Imported, mode: str, solved: Volts) -> Difference:
     """Compare one kind of loads."""
     feeder = imported.feeder
     network = compile_network(feeder, frozenset(s.name for s in feeder.switches if s.closed))
@@ -75,7 +76,7 @@ def _difference(imported: Imported, mode: str) -> Difference:
     if mode == "direct":
         state = state._replace(exponent=np.full_like(state.exponent, 2.0))
     answer = solve(network, state)
-    theirs, opendss_converged = solved_volts(imported.engine, mode=mode)
+    theirs, opendss_converged = solved
     floating = unearthed_buses(feeder)
     rows: list[_Bus] = []
     for name, nodes in _by_bus(theirs).items():

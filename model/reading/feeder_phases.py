@@ -81,7 +81,7 @@ def _check_joining(feeder: Feeder, there: Mapping[str, int], report: Report) -> 
 def _require(path: KeyPath, wanted: str, there: int, report: Report) -> None:
     """Report phases that are not there."""
     if phase_mask(wanted) & ~there:
-        rule = f"must be phases that the source reaches there, which are {_named(letters(there))}"
+        rule = f"must be among those that the source reaches there ({_named(letters(there))})"
         report.add(path, rule, repr(wanted))
 
 

@@ -216,7 +216,7 @@ REGULATORS: tuple[Field, ...] = (
         kind="integers",
         count=3,
         default=(0, 0, 0),
-        doc="Tap positions of phases a, b, c; `to` has 1 + tap x `step_pct` / 100 of `from`.",
+        doc="Tap positions of phases a, b, c; each adds tap x `step_pct` of its voltage at `from`.",
     ),
     Field(
         name="step_pct",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,8 @@ from ...model.distributions import Choices
 from ...model.events.base import Places, places_on
 from ...model.network import CONNECTIONS, Network, compile_network
 from ...model.parts import Feeder
-from ...model.points import Points, Terminal, find_points
+from ...model.points import Points, find_points
+from ...model.sides import edge_nodes
 from ...optimise.counts import Grid
 from ..spec.events import CLASSES, SwitchState
 from ..spec.parts import UNKNOWN_CONNECTION
@@ -21,7 +22,10 @@ from ..spec.study_file import Study
 from .classes import DrawClass
 from .load_levels import load_places
 
-__all__ = ["Case", "Group", "Wired", "make_case", "make_cases"]
+__all__ = ["Case", "Group", "Sites", "Wired", "make_case", "make_cases"]
+
+LOW_VOLTAGE_V = 1000.0 / 3.0**0.5  #: phase to earth; up to 1 kV between phases, IEC 60038
+SAME = 1e-6  #: relative difference of nominal voltages that are the same
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +45,19 @@ class Wired:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sites:
+    """Lines of medium voltage on which events of a class may stand."""
+
+    regions: tuple[Places, ...]  #: of each section, and of what lies alike to all of them
+    alike: tuple[Places, ...]  #: the same with paths and laterals apart, for breaks
+
+    @property
+    def edges(self) -> NDArray[np.int64]:
+        """All the edges."""
+        return np.concatenate([own.edges for own in self.alike])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Case:
     """A feeder and a study in one network state: everything that a block needs."""
 
@@ -51,8 +68,7 @@ class Case:
     points: Points
     ties: tuple[Wired, ...]  #: states that tie switching goes to and comes from
     transfers: tuple[Wired, ...]  #: and transfers
-    lines: Places  #: every line, for breaks
-    regions: tuple[Places, ...]  #: each section's lines, and those in none
+    places: Mapping[int, Sites]  #: on lines of at least so many phases
     yg_d_units: NDArray[np.int64]  #: units that may be Yg/D, in order
     unknown_units: NDArray[np.int64]  #: units whose connection is drawn
     unknown_choices: Choices
@@ -119,8 +135,7 @@ def _case(
         points=wired.points,
         ties=ties,
         transfers=transfers,
-        lines=places_on(network),
-        regions=_regions(network, wired.points.terminals),
+        places={least: _sites(network, wired.points, least) for least in (1, 2, 3)},
         yg_d_units=np.array([units.index(name) for name in study.transformers.yg_d], np.int64),
         unknown_units=np.array(unknown, np.int64),
         unknown_choices=choices,
@@ -153,11 +168,36 @@ def _others(
     return tuple(state for state in wired if key(state) != key(own))
 
 
-def _regions(network: Network, terminals: tuple[Terminal, ...]) -> tuple[Places, ...]:
-    sections = [terminal.in_section for terminal in terminals[::2]]
+def _sites(network: Network, points: Points, least_phases: int) -> Sites:
+    """Lines of medium voltage with at least so many phases."""
+    medium = _medium_voltage(network, points)
+    sections = [terminal.in_section for terminal in points.terminals[::2]]
     rest = ~np.any(sections, axis=0)
-    regions = [places_on(network, chosen) for chosen in [*sections, rest]]
-    return tuple(region for region in regions if region.edges.size)
+
+    def places(chosen: Iterable[NDArray[np.bool_]]) -> tuple[Places, ...]:
+        found = (places_on(network, medium & own, least_phases) for own in chosen)
+        return tuple(own for own in found if own.edges.size)
+
+    alike = _alike(points)
+    return Sites(regions=places([*sections, *(own & rest for own in alike)]), alike=places(alike))
+
+
+def _alike(points: Points) -> list[NDArray[np.bool_]]:
+    """Parts of the network that lie alike to every section.
+
+    A short path, or a stretch upstream of all, would hardly be drawn as one with long laterals.
+    """
+    sides = np.stack([terminal.edge_side for terminal in points.terminals[::2]])
+    parts, part = np.unique(sides, axis=1, return_inverse=True)
+    return [part.reshape(-1) == n for n in range(parts.shape[1])]
+
+
+def _medium_voltage(network: Network, points: Points) -> NDArray[np.bool_]:
+    """(edges,) at a measuring point's nominal voltage, or between low voltage and theirs."""
+    _, lower = edge_nodes(network)
+    v, own = network.node_v[lower], points.v_nominal_v
+    between = (v >= LOW_VOLTAGE_V) & (v <= own.max(initial=0.0) * (1.0 + SAME))
+    return np.asarray(between | np.isclose(v[:, None], own, rtol=SAME, atol=0.0).any(axis=1))
 
 
 def _drawn(feeder: Feeder, study: Study, ties: bool, transfers: bool) -> tuple[DrawClass, ...]:

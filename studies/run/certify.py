@@ -17,7 +17,7 @@ from .cases import Case
 from .classes import FALLEN, FALLEN_OHM, REPORTED, DrawClass
 from .draw_event import possible_rows
 from .options import options_text, trigger_text
-from .status import load_side_status, status_of
+from .status import impedance_note, load_side_status, status_of
 from .validation import Validation, add_up
 
 __all__ = [
@@ -46,6 +46,13 @@ NOT_COVERED = (
 )
 
 SPENT = "this sample is spent: run again with a new --seed"
+
+FLAGS = (
+    "dead",
+    "floating",
+    "unearthed",
+    "not_converged",
+)  #: in the order in which blocks count them
 
 #: the criteria in the order in which a verdict names the first that fails
 CAUSES = tuple(reason for reason in Reason if reason != Reason.TRIP)
@@ -77,10 +84,25 @@ def not_covered(validations: Sequence[Validation]) -> list[str]:
     return [*missing, *NOT_COVERED]
 
 
-def numerics(validations: Sequence[Validation]) -> dict[str, int]:
-    """Scenarios with a dead conductor, a floating island, or loads that did not settle."""
+def numerics(
+    validations: Sequence[Validation], training: NDArray[np.int64] | None = None
+) -> dict[str, Any]:
+    """Scenarios with a dead conductor, a floating island, or loads that did not settle.
+
+    ``training`` are the counts of the sample on which settings were chosen, if any.
+    """
     flags = np.sum([own.flags for own in validations], axis=0)
-    return dict(zip(("dead", "floating", "not_converged"), flags.tolist(), strict=True))
+    scenarios = np.sum([own.scenarios for own in validations], axis=0)
+    return {
+        **dict(zip(FLAGS, flags.sum(axis=0).tolist(), strict=True)),
+        "training_not_converged": None if training is None else int(training[-1]),
+        "by_class": [
+            {"name": drawn.name.lower(), "scenarios": int(scenarios[drawn])}
+            | dict(zip(FLAGS, flags[drawn].tolist(), strict=True))
+            for drawn in DrawClass
+            if scenarios[drawn]
+        ],
+    }
 
 
 # ---- rows of a result ----
@@ -141,6 +163,7 @@ def section_row(sheet: Sheet, t: int, given: Given) -> dict[str, Any]:
     ]
     must_not = [one for one in classes if one["kind"] == "must_not_trip"]
     row |= _dependability(t, 0, own, validation, alpha)
+    row["least_z_op_ohm"] = _finite(validation.least_z_ohm[t])
     row |= {
         "security_trials": sum(one["trials"] for one in must_not),
         "false_trips": sum(one["trips"] for one in must_not) if own else None,
@@ -159,7 +182,8 @@ def section_row(sheet: Sheet, t: int, given: Given) -> dict[str, Any]:
         status, reason = load_side_status(row)
     row["status"] = status
     spent = SPENT if sheet.chosen and row["false_trips"] else None
-    row["reason"] = "; ".join(filter(None, (reason, spent, given.note)))
+    said = (reason, spent, given.note, impedance_note(row, case.study.certificate.margin))
+    row["reason"] = "; ".join(filter(None, said))
     return row
 
 
@@ -204,6 +228,10 @@ def _dependability(
     }
 
 
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
 def _no_evidence() -> dict[str, Any]:
     """The keys of a terminal on which nothing was judged."""
     empty: dict[str, Any] = dict.fromkeys(
@@ -214,6 +242,7 @@ def _no_evidence() -> dict[str, Any]:
             "dependability",
             "dependability_low",
             "dependability_high",
+            "least_z_op_ohm",
             "security_trials",
             "false_trips",
             "false_trip_upper",
@@ -324,11 +353,12 @@ def certified(
     sheets: Sequence[Sheet],
     given: Sequence[Sequence[Given]],
     rivals: Sequence[Sequence[Sequence[Rival]]],
+    training: NDArray[np.int64] | None = None,
 ) -> dict[str, Any]:
     """Rows of all groups and terminals, and what the bounds do not cover.
 
     ``given`` and ``rivals`` run over groups and terminals; a terminal's first rival is what
-    is given.
+    is given. ``training``: as of ``numerics``.
     """
     validations = [sheet.validation for sheet in sheets]
     return {
@@ -345,5 +375,5 @@ def certified(
             for row in compared_rows(sheet, t, own)
         ],
         "feeder_false_trips": {"per_year_upper": None, "assumptions": not_covered(validations)},
-        "numerics": numerics(validations),
+        "numerics": numerics(validations, training),
     }

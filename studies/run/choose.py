@@ -131,6 +131,7 @@ class Training:
     front: tuple[Front, ...]
     trials: NDArray[np.int64]  #: (R, T)
     reachable: NDArray[np.int64]  #: (T,)
+    flags: NDArray[np.int64]  #: (4,) scenarios by ``tally.FLAGGED``
 
 
 def gather(blocks: Iterable[Trained]) -> Training:
@@ -152,6 +153,7 @@ def _add(parts: Sequence[Trained | Training]) -> Training:
         front=tuple(merge_fronts([p.front[t] for p in parts]) for t in terminals),
         trials=np.sum([p.trials for p in parts], axis=0),
         reachable=np.sum([p.reachable for p in parts], axis=0),
+        flags=np.sum([p.flags for p in parts], axis=0),
     )
 
 

@@ -16,7 +16,7 @@ from ...model.machine_state import machine_state
 from ...model.machines import DER_MODELS
 from ...model.network import CONNECTIONS
 from ...model.solve import quiet_state
-from ...model.states import State
+from ...model.states import BY_LAW, State
 from ..spec.correlations import draw_scalars
 from .cases import Case, Group, Wired, make_case, make_cases
 from .classes import DrawClass, Purpose
@@ -131,7 +131,9 @@ def _draw_states(rng: np.random.Generator, case: Case, size: int) -> tuple[State
     level = load_levels(study, case.load_places, scalars)
     scale = level * study.loads.each.draw(rng, shape)
     spread = rng.uniform(-study.loads.exponent_spread, study.loads.exponent_spread, shape)
-    exponent = np.clip(scalars["loads.exponent"] + spread, 0.0, 2.0)
+    # where the study leaves it to the file, each load follows its own law there
+    common = scalars.get("loads.exponent")
+    exponent = np.full(shape, BY_LAW) if common is None else np.clip(common + spread, 0.0, 2.0)
     source_change = scalars["ambient.source_pct"] / 100.0
     load_change = rng.uniform(-study.ambient.load_pct, study.ambient.load_pct, shape) / 100.0
     machines = _machine_draws(case, scalars, size)

@@ -28,18 +28,26 @@ from ...model.events.single_pole import draw_single_pole
 from ...model.events.source_step import draw_source_step
 from ...model.events.step_with_tap import draw_step_with_tap
 from ..spec.events import WIRING_KINDS
-from .cases import Case
+from .cases import Case, Sites
 from .classes import NETWORK, REPORTED, DrawClass, sides
 
 __all__ = ["draw_event", "draw_wiring", "event_sides", "possible_rows"]
 
 Int = NDArray[np.int64]
-_Draw = Callable[[np.random.Generator, Case, int], Event]
+_Draw = Callable[[np.random.Generator, Case, Sites, int], Event]
+
+LEAST_PHASES = {
+    DrawClass.OPEN_THREE: 3,
+    DrawClass.CAPACITOR_STEP: 3,
+    DrawClass.MOTOR_START: 3,
+    DrawClass.LINE_FAULT: 2,
+}
+"""Classes that need more than one phase of the line on which they stand."""
 
 
 def draw_event(rng: np.random.Generator, case: Case, drawn: DrawClass, size: int) -> Event:
     """The events of one class; switching and wrong wiring are no event on the feeder."""
-    return _DRAWS[drawn](rng, case, size)
+    return _DRAWS[drawn](rng, case, _sites(case, drawn), size)
 
 
 def draw_wiring(
@@ -66,17 +74,17 @@ def event_sides(case: Case, event: Event) -> NDArray[np.int8]:
 def possible_rows(case: Case) -> NDArray[np.bool_]:
     """(R, T): the rows of ``REPORTED`` in which the study's events can count at a terminal.
 
-    Equipment stands where it stands; every other class is drawn on all lines.
+    Equipment stands where it stands; every other class is drawn on all lines of medium voltage
+    that have its phases.
     """
     network, terminals = case.network, case.points.terminals
-    lines = np.flatnonzero(network.length_km > 0)
     at_edges = {DrawClass.REGULATOR_TAP: np.flatnonzero(network.tree.regulator >= 0)}
     found = np.zeros((len(REPORTED), len(terminals)), np.bool_)
     for r, own in enumerate(REPORTED):
         if own.drawn not in case.drawn:
             continue
         for t, terminal in enumerate(terminals):
-            seen = terminal.edge_side[at_edges.get(own.drawn, lines)]
+            seen = terminal.edge_side[at_edges.get(own.drawn, _sites(case, own.drawn).edges)]
             if own.drawn == DrawClass.DER_TRIP:
                 seen = terminal.node_side[der_nodes(network)]
             whole = own.drawn in (*NETWORK, DrawClass.WIRING)
@@ -84,17 +92,22 @@ def possible_rows(case: Case) -> NDArray[np.bool_]:
     return found
 
 
-def _open_phase(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _sites(case: Case, drawn: DrawClass) -> Sites:
+    """Where events of the class may stand: on lines that have its phases."""
+    return case.places[LEAST_PHASES.get(drawn, 1)]
+
+
+def _open_phase(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     share = case.study.events.open_phase.two_phase_share
-    return draw_open_phase(rng, size, case.network, case.lines, share)
+    return draw_open_phase(rng, size, case.network, sites.alike, share)
 
 
-def _open_three(rng: np.random.Generator, case: Case, size: int) -> Event:
-    return draw_open_three(rng, size, case.network, case.lines)
+def _open_three(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
+    return draw_open_three(rng, size, case.network, sites.alike)
 
 
-def _load_step(rng: np.random.Generator, case: Case, size: int) -> Event:
-    return draw_load_step(rng, size, case.network, case.regions, _step_law(case))
+def _load_step(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
+    return draw_load_step(rng, size, case.network, sites.regions, _step_law(case))
 
 
 def _step_law(case: Case) -> LoadStepLaw:
@@ -102,99 +115,99 @@ def _step_law(case: Case) -> LoadStepLaw:
     return LoadStepLaw(kw=own.kw, single_phase_share=own.single_phase_share, exponent=own.exponent)
 
 
-def _source_step(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _source_step(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     return draw_source_step(rng, size, case.network, case.study.events.source_step.pct)
 
 
-def _capacitor_step(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _capacitor_step(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     own = case.study.events.capacitor_step
-    return draw_capacitor_step(rng, size, case.network, case.regions, own.kvar, own.delta_share)
+    return draw_capacitor_step(rng, size, case.network, sites.regions, own.kvar, own.delta_share)
 
 
-def _motor_start(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _motor_start(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     own = case.study.events.motor_start
     law = MotorStartLaw(kva=own.kva, times=own.times, power_factor=own.power_factor)
-    return draw_motor_start(rng, size, case.network, case.regions, law)
+    return draw_motor_start(rng, size, case.network, sites.regions, law)
 
 
-def _regulator_tap(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _regulator_tap(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     own = case.study.events.regulator_tap
     return draw_regulator_tap(rng, size, case.network, own.taps, own.single_phase_share)
 
 
-def _earth_fault(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _earth_fault(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     ohm = case.study.events.earth_fault.ohm
-    return draw_earth_fault(rng, size, case.network, case.regions, ohm)
+    return draw_earth_fault(rng, size, case.network, sites.regions, ohm)
 
 
-def _line_fault(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _line_fault(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     own = case.study.events.line_fault
-    return draw_line_fault(rng, size, case.network, case.regions, own.ohm, own.earth_share)
+    return draw_line_fault(rng, size, case.network, sites.regions, own.ohm, own.earth_share)
 
 
-def _nothing(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _nothing(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     return no_event(case.network, size)
 
 
-def _der_trip(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _der_trip(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     return draw_der_trip(rng, size, case.network, case.study.events.der_trip.share)
 
 
-def _der_ramp(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _der_ramp(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     return draw_der_ramp(rng, size, case.network, case.study.events.der_ramp.factor)
 
 
-def _energisation(rng: np.random.Generator, case: Case, size: int) -> Event:
-    return draw_energisation(rng, size, case.network, case.regions)
+def _energisation(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
+    return draw_energisation(rng, size, case.network, sites.regions)
 
 
-def _reclosing(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _reclosing(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     cold_load = case.study.events.reclosing.cold_load
-    return draw_reclosing(rng, size, case.network, case.regions, cold_load)
+    return draw_reclosing(rng, size, case.network, sites.regions, cold_load)
 
 
-def _single_pole(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _single_pole(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     share = case.study.events.single_pole.two_phase_share
-    return draw_single_pole(rng, size, case.network, case.regions, share)
+    return draw_single_pole(rng, size, case.network, sites.regions, share)
 
 
-def _fallen_source_side(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _fallen_source_side(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     ohm = case.study.events.fallen_source_side.ohm
-    return draw_fallen_source_side(rng, size, case.network, case.regions, ohm)
+    return draw_fallen_source_side(rng, size, case.network, sites.regions, ohm)
 
 
-def _fallen_load_side(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _fallen_load_side(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     ohm = case.study.events.fallen_load_side.ohm
-    return draw_fallen_load_side(rng, size, case.network, case.regions, ohm)
+    return draw_fallen_load_side(rng, size, case.network, sites.regions, ohm)
 
 
-def _open_with_load_step(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _open_with_load_step(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     events = case.study.events
     law = OpenWithLoadStepLaw(
         two_phase_share=events.open_phase.two_phase_share,
         kw=events.open_with_load_step.kw,
         single_phase_share=events.load_step.single_phase_share,
     )
-    return draw_open_with_load_step(rng, size, case.network, case.regions, law)
+    return draw_open_with_load_step(rng, size, case.network, sites.regions, law)
 
 
-def _open_with_der_trip(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _open_with_der_trip(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     events = case.study.events
     two, share = events.open_phase.two_phase_share, events.open_with_der_trip.share
-    return draw_open_with_der_trip(rng, size, case.network, case.regions, two, share)
+    return draw_open_with_der_trip(rng, size, case.network, sites.regions, two, share)
 
 
-def _load_swap(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _load_swap(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     own = case.study.events.load_swap
     single = case.study.events.load_step.single_phase_share
     law = LoadSwapLaw(kw=own.kw, ratio=own.ratio, single_phase_share=single)
-    return draw_load_swap(rng, size, case.network, case.regions, law)
+    return draw_load_swap(rng, size, case.network, sites.regions, law)
 
 
-def _step_with_tap(rng: np.random.Generator, case: Case, size: int) -> Event:
+def _step_with_tap(rng: np.random.Generator, case: Case, sites: Sites, size: int) -> Event:
     own, step = case.study.events.step_with_tap, case.study.events.load_step
     law = LoadStepLaw(kw=own.kw, single_phase_share=step.single_phase_share, exponent=step.exponent)
-    return draw_step_with_tap(rng, size, case.network, case.regions, law, own.pct)
+    return draw_step_with_tap(rng, size, case.network, sites.regions, law, own.pct)
 
 
 _DRAWS: dict[DrawClass, _Draw] = {

@@ -25,7 +25,7 @@ from .draw_event import event_sides
 __all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "bounds_of", "observe"]
 
 BLOCK = 2000  #: scenarios a block; part of every random stream, so never a matter of jobs
-TOLERANCE_PU = 1e-7  #: last change of a winding voltage; the instruments add 1.3e-4
+TOLERANCE_PU = 1e-5  #: last change of a winding voltage; the instruments add 1.3e-4
 
 Int = NDArray[np.int64]
 
@@ -85,7 +85,7 @@ def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
     point, kind = scenarios.miswired
     if kind.any():
         phasors = miswire(phasors, point, kind)
-    terminals, v_nominal_v = case.points.terminals, case.network.tree.v_nominal_v
+    terminals, v_nominal_v = case.points.terminals, case.points.v_nominal_v
     evidence = evidence_of(phasors, terminals, v_nominal_v, *options)
     # of the state before the event; behind generation power may flow either way
     one_way = fed_one_way(first.points.terminals) & (not case.feeder.ders)

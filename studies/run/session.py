@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from ... import __version__
 from ...model.errors import InputError, OpenPhaseError
 from ...model.parts import Feeder
-from ...model.reading.feeder_file import load_feeder
 from ...model.reading.toml_file import read_text
 from ...model.reading.toml_lines import locator
 from ...optimise.certificate import needed_trials, share_of_alpha
-from ..spec.study_file import Study, check_study, default_study, read_study
+from ..loading import load_with_points
+from ..spec.study_file import Study, check_study, default_study, own_study_file, read_study
 from .blocks import run_blocks
 from .cases import Case
 from .certify import Rival, Validation, add_up, judged_pairs
@@ -89,8 +89,10 @@ def say(text: str) -> None:
 
 
 def read_feeder(name: str) -> Feeder:
-    """The feeder; InputError where it has no section to judge."""
-    feeder = load_feeder(name)
+    """The feeder, with default points where it has none; InputError where there is no section."""
+    feeder, said = load_with_points(name)
+    for text in said:
+        say(f"{feeder.name}: {text}")
     if not feeder.sections:
         raise InputError.single(feeder.name, "sections", "none", "must name at least one section")
     return feeder
@@ -98,9 +100,12 @@ def read_feeder(name: str) -> Feeder:
 
 def read_own_study(args: argparse.Namespace, feeder: Feeder) -> Study:
     """The study that was named, else the feeder's own; checked against the feeder."""
-    if args.study:
-        study = read_study(args.study)
-        check_study(study, feeder, str(args.study), locator(read_text(args.study)))
+    file = args.study or own_study_file(args.feeder)
+    if file:
+        study = read_study(file)
+        check_study(study, feeder, str(file), locator(read_text(file)))
+        if not args.study:
+            say(f"study: {file}, which stands beside the feeder file")
     else:
         study = default_study(args.feeder)
         check_study(study, feeder, "the default study")

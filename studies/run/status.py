@@ -20,6 +20,7 @@ from .draw import BlockId
 
 __all__ = [
     "common_window",
+    "impedance_note",
     "load_side_status",
     "loop_note",
     "nearest_false_trip",
@@ -223,6 +224,30 @@ def _any_of(ways: list[str]) -> str:
     ('a, b, or c', 'a')
     """
     return ", ".join([*ways[:-1], f"or {ways[-1]}"]) if len(ways) > 1 else ways[0]
+
+
+def impedance_note(row: dict[str, Any], margin: float) -> str | None:
+    """What has to be said of a Z_set that does not lie between the line and the breaks.
+
+    Examples
+    --------
+    >>> line = {"line_z1_ohm": [0.3, 0.4], "least_z_op_ohm": 80.0, "negative_sign": True}
+    >>> impedance_note(line | {"z_set_ohm": 5.0}, 1.25) is None
+    True
+    >>> impedance_note(line | {"z_set_ohm": 0.5}, 1.25)
+    'Z_set is 1 times the line of 0.5 Ω, which harmless events show: the sign keeps them out'
+    """
+    line, least, z = abs(complex(*row["line_z1_ohm"])), row["least_z_op_ohm"], row["z_set_ohm"]
+    said = []
+    if z < margin * line:
+        why = "the sign keeps them out" if row["negative_sign"] else "none came near I_set"
+        said.append(
+            f"Z_set is {z / line:.2g} times the line of {line:.3g} Ω, which harmless events "
+            f"show: {why}"
+        )
+    if least is not None and least <= z:
+        said.append(f"some breaks show no more than Z_set, |Z1| down to {least:.3g} Ω")
+    return "; ".join(said) or None
 
 
 # ---- of a closed loop ----

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...detector.criteria import Options, Reach, Reason, Settings, reach_of, verdict
 from ...detector.evidence import only
 from ...model.solver.breaks import DEAD, FLOATING
-from ...model.states import NOT_CONVERGED
+from ...model.states import NOT_CONVERGED, UNEARTHED
 from ...optimise.counts import Corners, corners_of
 from ...optimise.staircase import Front, front_of
 from .along import distance_share
@@ -24,6 +24,9 @@ __all__ = ["PLACES", "Tested", "Trained", "judge_block", "train_block"]
 
 PLACES = 40  #: stretches of a section in which breaks are counted for the profile
 KEPT = 40  #: scenarios of a block whose evidence is kept for pictures
+
+FLAGGED = (DEAD, FLOATING, UNEARTHED, NOT_CONVERGED)
+"""A dead conductor; a floating island; a part that nothing earths; no solution."""
 
 Int = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -39,6 +42,7 @@ class Trained:
     front: tuple[Front, ...]  #: of the same events
     trials: Int  #: (R, T) per reported class
     reachable: Int  #: (T,)
+    flags: Int  #: (4,) scenarios by ``FLAGGED``
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,7 +59,8 @@ class Tested:
     missed: Int  #: (T, Reason) of these, by the criterion that failed
     profile: Int  #: (T, PLACES, 2) internal breaks along the section: all, found
     front: tuple[Front, ...]  #: false trips of the chosen setting, per terminal
-    flags: Int  #: (3,) scenarios dead, floating, not converged
+    least_z_ohm: NDArray[np.float64]  #: (T,) smallest |Z1| of these, see ``_least_z``
+    flags: Int  #: (4,) scenarios by ``FLAGGED``
     verdicts: NDArray[np.uint8]  #: (T, S) what the first setting said, as ``pack_verdicts``
     sample: NDArray[np.float64]  #: (T, 5, KEPT) as ``_sample`` has it
     sample_side: NDArray[np.int8]  #: (T, KEPT)
@@ -88,6 +93,7 @@ def train_block(case: Case, which: BlockId, size: int = BLOCK) -> Trained:
         front=tuple(front),
         trials=_counted(rows),
         reachable=_reachable(rows, seen).sum(axis=1),
+        flags=_flags(seen),
     )
 
 
@@ -124,7 +130,8 @@ def judge_block(
         front=tuple(
             _false_trips(reach[t], rows[t], trip[0, t], _identity(which, size)) for t in terminals
         ),
-        flags=np.array([(seen.flags & bit != 0).sum() for bit in (DEAD, FLOATING, NOT_CONVERGED)]),
+        least_z_ohm=np.array([_least_z(seen, t, settings[t][0], reachable[t]) for t in terminals]),
+        flags=_flags(seen),
         verdicts=pack_verdicts(reason[0], seen.side, seen.connected),
         sample=np.stack(
             [_sample(reach[t], np.abs(evidence.z1_ohm[t]), reason[0, t]) for t in terminals]
@@ -183,6 +190,21 @@ def _fallen(drawn: DrawClass, seen: Observed, trip: Flags) -> Int:
 def _alarmed(seen: Observed) -> Flags:
     alarm = seen.evidence.alarm
     return np.zeros(seen.side.shape, np.bool_) if alarm is None else alarm != 0
+
+
+def _flags(seen: Observed) -> Int:
+    """(4,): scenarios by ``FLAGGED``."""
+    return np.array([(seen.flags & bit != 0).sum() for bit in FLAGGED])
+
+
+def _least_z(seen: Observed, t: int, chosen: Settings | None, reachable: Flags) -> float:
+    """Smallest |Z1| of the breaks in which I_set and V_set leave it to Z_set; inf: of none."""
+    if chosen is None:
+        return float("inf")
+    own = seen.evidence
+    left = reachable & (seen.flags & NOT_CONVERGED == 0) & ~own.blocked[t] & ~own.undefined[t, 0]
+    left &= (own.di1_a[t] >= chosen.i_set_a) & (own.dv1_pu[t] <= chosen.v_set_pu)
+    return float(np.abs(own.z1_ohm[t, left]).min(initial=np.inf))
 
 
 def _reach(seen: Observed, t: int, chosen: Settings | None) -> Reach:

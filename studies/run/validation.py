@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optimise.staircase import Front, merge_fronts
+from .classes import DrawClass
 from .draw import BlockId
-from .tally import Tested
+from .tally import FLAGGED, Tested
 
 __all__ = ["Validation", "add_up"]
 
@@ -30,15 +31,16 @@ class Validation:
     missed: NDArray[np.int64]  #: (T, Reason)
     profile: NDArray[np.int64]  #: (T, PLACES, 2)
     front: tuple[Front, ...]
-    flags: NDArray[np.int64]  #: (3,)
-    scenarios: int
+    least_z_ohm: NDArray[np.float64]  #: (T,)
+    flags: NDArray[np.int64]  #: (DrawClass, 4) by ``tally.FLAGGED``
+    scenarios: NDArray[np.int64]  #: (DrawClass,)
     samples: tuple[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]], ...]  #: for pictures
 
 
 #: what simply adds up over blocks
 ADDED = (
     *("trials", "effective", "trips", "alarms", "fallen", "reachable"),
-    *("found", "missed", "profile", "flags"),
+    *("found", "missed", "profile"),
 )
 
 SAMPLED_BLOCKS = 25  #: blocks of a class whose kept evidence goes into pictures
@@ -49,13 +51,24 @@ def add_up(blocks: Iterable[tuple[BlockId, Tested]], size: int) -> Validation:
     total: dict[str, Any] = {}
     front: tuple[Front, ...] = ()
     samples: list[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]]] = []
-    count = 0
+    least = np.array(np.inf)
+    flags = np.zeros((len(DrawClass), len(FLAGGED)), np.int64)
+    count = np.zeros(len(DrawClass), np.int64)
     for which, block in blocks:
-        count += size
+        count[which.drawn] += size
+        flags[which.drawn] += block.flags
+        least = np.minimum(least, block.least_z_ohm)
         for name in ADDED:
             total[name] = total.get(name, 0) + getattr(block, name)
         pairs = zip(front, block.front, strict=True) if front else ()
         front = tuple(merge_fronts(list(pair)) for pair in pairs) or block.front
         if which.block < SAMPLED_BLOCKS:
             samples.append((which, block.sample, block.sample_side))
-    return Validation(front=front, scenarios=count, samples=tuple(samples), **total)
+    return Validation(
+        front=front,
+        least_z_ohm=least,
+        flags=flags,
+        scenarios=count,
+        samples=tuple(samples),
+        **total,
+    )

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..spec.study_file import Study, dump_study
 from .html_parts import bullets, table
+from .sheet import UNSETTLED
 
 __all__ = ["assumptions"]
 
@@ -14,9 +15,12 @@ STATED = (
     "Two steady states of the feeder, ΔT apart, with one event between them. Every scenario draws "
     "all loads, what is unknown of the transformers, DER and motors afresh, and small changes of "
     "the source and of each load, whatever the event.",
-    "Breaks of one, two or all three conductors are uniform in length over all lines; other "
-    "events pick a section first, every one equally likely, then a place uniform in length.",
-    "Below 0.7 pu all loads are constant impedance.",
+    "Events pick a region first, every one equally likely, then a place uniform in length: a "
+    "section, or what lies alike to all sections; for breaks a section's path and its laterals are "
+    "two regions. They stand on lines of medium voltage, take phases that are there, and scale with the nominal "
+    "voltage of their place.",
+    "Where the study draws their exponents, loads are constant impedance below 0.7 pu; else each "
+    "follows its own law.",
     "Random errors are complex, per phase, channel and frame: normal with a standard deviation of "
     "a third of their bound per axis, truncated at the bound. Ratio, angle and clock errors are "
     "uniform within their bounds, and the same in both frames.",
@@ -29,7 +33,8 @@ def assumptions(result: dict[str, Any], study: Study) -> str:
     solved = (
         "Numerics: what an opened conductor leads to is dead (nothing connected, or no source) in "
         f"{numerics['dead']:,} validation scenarios and floating in {numerics['floating']:,}; "
-        f"{numerics['not_converged']:,} did not converge."
+        f"nothing earths a part behind an ungrounded winding in {numerics['unearthed']:,}; "
+        f"{numerics['not_converged']:,} did not converge{_unsettled(numerics)}."
     )
     drawn = {own["name"] for row in result["sections"] for own in row["classes"]}
     missing = bullets(result["feeder_false_trips"]["assumptions"])
@@ -39,6 +44,18 @@ def assumptions(result: dict[str, Any], study: Study) -> str:
         "<p>Every value of study.toml: [a, b] is uniform between a and b; docs/study-file.md says "
         f"what each means.</p>\n{_laws(study, drawn)}\n<h3>Not covered</h3>\n{missing}"
     )
+
+
+def _unsettled(numerics: dict[str, Any]) -> str:
+    """In which classes, and in training."""
+    said = [
+        f"{own['not_converged']:,} of {own['scenarios']:,} {own['name']}"
+        for own in numerics["by_class"]
+        if own["not_converged"]
+    ]
+    if training := numerics["training_not_converged"]:
+        said.append(f"and {training:,} more in training")
+    return f" ({', '.join(said)}). {UNSETTLED[:-1]}" if said else ""
 
 
 def _laws(study: Study, drawn: set[str]) -> str:

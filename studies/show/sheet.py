@@ -26,6 +26,9 @@ __all__ = [
 
 PAGE = 100  #: columns of everything that is printed for people
 GAP = "  "
+UNSETTLED = (
+    "Of these a break counts as missed; another event is judged by where its loads had got to."
+)
 MOST_CLASSES = 6  #: classes with trips that are listed per terminal
 
 WORDS = {(own.name, own.side): own.words for own in REPORTED}
@@ -66,7 +69,7 @@ def sheet_table(result: dict[str, Any]) -> str:
     lines = _title(result)
     for group, own in _by_group(rows):
         lines += ["", *_group_head(group, rows), *_setting_table(own, "assessed" in result)]
-    lines += ["", *_legend(rows)]
+    lines += ["", *_legend(rows), *_impedances(rows)]
     several = len(_by_group(rows)) > 1
     blocks = {
         "false trips by class": [(row, _false_trips(row)) for row in rows],
@@ -82,6 +85,7 @@ def sheet_table(result: dict[str, Any]) -> str:
         if said:
             lines += ["", title, *said]
     lines += _apart(rows, several)
+    lines += _unsettled(result["numerics"])
     if {row["name"] for row in result["compared"]} - {"assessed"}:
         for group, own in _by_group(result["compared"]):
             lines += ["", *_group_head(group, rows), *_comparison(own)]
@@ -164,6 +168,27 @@ def _legend(rows: list[dict[str, Any]]) -> list[str]:
     )
 
 
+def _impedances(rows: list[dict[str, Any]]) -> list[str]:
+    """What Z_set must part: the line that harmless events show, and the breaks."""
+    several = len(_by_group(rows)) > 1
+    said = [
+        f"{row_name(row, several)} {abs(complex(*row['line_z1_ohm'])):.3g} / "
+        f"{setting_text(row['z_set_ohm'])} / {_ohm(row['least_z_op_ohm'])}"
+        for row in rows
+        if row["z_set_ohm"] is not None
+    ]
+    if not said:
+        return []
+    return wrapped(
+        "Ω: |Z1| of the section's line, which harmless events show / Z_set / the smallest |Z1| of "
+        f"the breaks that I_set and V_set leave to Z_set: {', '.join(said)}."
+    )
+
+
+def _ohm(value: float | None) -> str:
+    return "no break" if value is None else f"{value:.3g}"
+
+
 def class_words(own: dict[str, Any]) -> str:
     """A class of a result in a reader's words, in the plural."""
     return WORDS.get((own["name"], own["side"]), f"{own['name']} {own['side']}")
@@ -193,6 +218,21 @@ def _apart(rows: list[dict[str, Any]], several: bool) -> list[str]:
         return []
     head = "told apart, in neither count: the share that trips, of wiring faults the share that"
     return ["", *wrapped(f"{head} raises the alarm"), *lines]
+
+
+def _unsettled(numerics: dict[str, Any]) -> list[str]:
+    """Scenarios without a solution, by class; nothing where there are none."""
+    drawn = {own.drawn.name.lower(): own.drawn.words for own in REPORTED}
+    said = [
+        f"{own['not_converged']:,} of {own['scenarios']:,} {drawn[own['name']]}"
+        for own in numerics["by_class"]
+        if own["not_converged"]
+    ]
+    if training := numerics["training_not_converged"]:
+        said.append(f"{training:,} scenarios of training")
+    if not said:
+        return []
+    return ["", *wrapped(f"did not converge: {', '.join(said)}. {UNSETTLED}")]
 
 
 def _apart_share(own: dict[str, Any]) -> str:

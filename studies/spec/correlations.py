@@ -19,9 +19,14 @@ def _source_change(study: Study) -> Distribution:
     return Uniform(low=-most, high=most)
 
 
+def _exponent(study: Study) -> Distribution | None:
+    drawn = study.loads.exponent
+    return None if isinstance(drawn, str) else drawn
+
+
 _SCALARS: dict[str, Callable[[Study], Distribution | None]] = {
     "loads.level": lambda study: study.loads.level,
-    "loads.exponent": lambda study: study.loads.exponent,
+    "loads.exponent": _exponent,
     "motors.share": lambda study: study.motors.share,
     "motors.y2_y1": lambda study: study.motors.y2_y1,
     "transformers.yg_d_count": lambda study: study.transformers.yg_d_count,

@@ -144,7 +144,7 @@ _STATE_TABLES: dict[str, tuple[Field, ...]] = {
             kind="distribution",
             low=0.0,
             high=2.0,
-            doc="Voltage exponent common to all loads.",
+            doc='Voltage exponent common to all loads; `"file"`: each by its own law there.',
         ),
         Field(
             name="exponent_spread",

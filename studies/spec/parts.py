@@ -55,7 +55,8 @@ class LoadDraw:
     each
         Further factor, drawn for each load by itself.
     exponent
-        Voltage exponent common to all loads, dimensionless.
+        Voltage exponent common to all loads, dimensionless; "file": each load follows its own
+        law in the feeder file.
     exponent_spread
         How far a load's exponent may lie from the common one, uniformly; the sum is clipped
         to 0..2.
@@ -63,7 +64,7 @@ class LoadDraw:
 
     level: Distribution = Uniform(low=0.25, high=1.0)
     each: Distribution = Uniform(low=0.8, high=1.2)
-    exponent: Distribution = Uniform(low=0.0, high=2.0)
+    exponent: Distribution | Literal["file"] = Uniform(low=0.0, high=2.0)
     exponent_spread: float = 0.3
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ...model.distributions import Fixed
 from ...model.errors import KeyPath, Report
-from ...model.reading.fields import Field, as_toml
+from ...model.reading.fields import Field, as_toml, describe_field
 from ...model.reading.table_check import check_table
 from .checks import check_together, try_grid
 from .device import Steps
@@ -151,6 +151,14 @@ def _read_ladder(value: object, field: Field, path: KeyPath, report: Report) -> 
     )
 
 
+def _read_exponent(value: object, field: Field, path: KeyPath, report: Report) -> object:
+    if not isinstance(value, str):
+        return READERS[field.kind](value, field, path, report)
+    if value != "file":
+        report.add(path, f"must be 'file', {describe_field(field)}", as_toml(value))
+    return "file"
+
+
 def _read_two_names(value: object, field: Field, path: KeyPath, report: Report) -> tuple[str, str]:
     faults = len(report.faults)
     names = READERS["names"](value, field, path, report)
@@ -179,6 +187,7 @@ _READERS: dict[KeyPath, Reader] = {
     ("events", "transfer", "states"): _read_states,
     ("correlations", "between"): _read_two_names,
     ("certificate", "loop_margins"): _read_two_factors,
+    ("loads", "exponent"): _read_exponent,
     ("device", "i_set"): _read_steps,
     ("device", "z_set_ohm"): _read_ladder,
 }

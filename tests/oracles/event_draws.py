@@ -49,8 +49,8 @@ OPEN_WITH_STEP = OpenWithLoadStepLaw(two_phase_share=0.2, kw=KW, single_phase_sh
 Draw = Callable[[np.random.Generator, int, Site], Event]
 
 DRAWS: dict[str, Draw] = {
-    "open_phase": lambda rng, n, at: draw_open_phase(rng, n, at.network, at.lines, 0.2),
-    "open_three": lambda rng, n, at: draw_open_three(rng, n, at.network, at.lines),
+    "open_phase": lambda rng, n, at: draw_open_phase(rng, n, at.network, at.regions, 0.2),
+    "open_three": lambda rng, n, at: draw_open_three(rng, n, at.network, at.regions),
     "load_step": lambda rng, n, at: draw_load_step(rng, n, at.network, at.regions, LOAD_STEP),
     "source_step": lambda rng, n, at: draw_source_step(rng, n, at.network, PCT),
     "capacitor_step": lambda rng, n, at: draw_capacitor_step(
@@ -117,12 +117,7 @@ TOUCHED: dict[str, set[str]] = {
 }
 
 #: those that are as likely in every region
-ON_REGIONS = tuple(
-    sorted(
-        set(DRAWS)
-        - {"open_phase", "open_three", "source_step", "regulator_tap", "der_trip", "der_ramp"}
-    )
-)
+ON_REGIONS = tuple(sorted(set(DRAWS) - {"source_step", "regulator_tap", "der_trip", "der_ramp"}))
 
 
 def draw(name: str, site: Site, size: int, seed: int = 3) -> Event:

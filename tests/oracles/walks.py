@@ -14,12 +14,16 @@ Thing = tuple[str, str]
 """What can be reached: a ("bus", name), or a ("line", name), switch or regulator."""
 
 
-def side_of(feeder: Feeder, section: Section, own: Thing) -> Side:
-    """The Side of a bus, line, switch or regulator in the feeder's normal state, a tree."""
+def side_of(feeder: Feeder, section: Section, own: Thing, path: list[Thing] | None = None) -> Side:
+    """The Side of a bus, line, switch or regulator in the feeder's normal state.
+
+    That is a tree, or the section's ``path`` is given.
+    """
     points = {point.name: point for point in feeder.points}
     local, remote = (("bus", points[name].bus) for name in (section.local, section.remote))
     lines: list[Thing] = [("line", own.name) for own in feeder.lines]
-    path = [own for own in lines if remote not in _reached(feeder, local, [own])]
+    if path is None:
+        path = [own for own in lines if remote not in _reached(feeder, local, [own])]
     source = ("bus", feeder.source.bus)
     if own in path:
         return Side.PATH
@@ -74,6 +78,7 @@ def _reached(
             ("line", feeder.lines),
             ("switch", [switch for switch in feeder.switches if switch.closed]),
             ("regulator", feeder.regulators),
+            ("transformer", feeder.inline_transformers),
         )
         for part in parts
         for bus in (part.from_bus, part.to_bus)

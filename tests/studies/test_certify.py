@@ -101,8 +101,9 @@ def validation(
         missed=missed,
         profile=np.zeros((TERMINALS, 40, 2), np.int64),
         front=(NONE,) * TERMINALS,
-        flags=np.zeros(3, np.int64),
-        scenarios=10 * n,
+        least_z_ohm=np.full(TERMINALS, np.inf),
+        flags=np.zeros((len(DrawClass), 4), np.int64),
+        scenarios=np.full(len(DrawClass), 10 * n, np.int64),
         samples=(),
     )
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from openphase.model import dump_feeder, feeder_from_toml, load_feeder, read_feeder
-from openphase.studies.checking import _text, summary
+from openphase.studies.checking import summary
 from openphase.studies.cli import main
+from openphase.studies.show.check_text import check_text
 from openphase.studies.show.feeder_layout import lay_out
 from openphase.studies.spec.study_file import default_study
 
@@ -48,6 +49,9 @@ LONG = {
     "units": [f"transformer {n}" for n in range(40)],
     "ders": ["Solarpark"],
     "capacitors": [],
+    "inline_transformers": [],
+    "shifted_by": ["Umspanner"],
+    "laterals_km_by_phases": [1.5, 0.25, 0.0],
     "regulators": [f"Längsregler {n}" for n in range(9)],
     "switches": ["Schalter C"],
 }
@@ -59,7 +63,7 @@ def test_long_names_and_lists_fit_the_page(local: str) -> None:
     found["feeder"] = "a feeder with a long name " * 6
     found["loop"] = [f"tie {n}" for n in range(40)]
     found["sections"] = [{**LONG, "local": local}] * 2
-    lines = _text(found).splitlines()
+    lines = check_text(found).splitlines()
     assert max(map(len, lines)) <= 100
     said = " ".join(" ".join(lines).split())
     for word in ("transformer", "Schalter C", "12.345", "400.011", "1000 .. 12000", "tie 39"):
@@ -74,7 +78,7 @@ def test_heads_stand_above_their_values(local: str) -> None:
     found = summary(load_feeder("paper"), default_study("paper"))
     for row in found["sections"]:
         row["local"] = local
-    lines = _text(found).splitlines()
+    lines = check_text(found).splitlines()
     n = next(n for n, line in enumerate(lines) if "downstream kW" in line)
     head, row = lines[n : n + 2]
     for title, value in (("km", "3"), ("|Z1| Ω", "0.390"), ("downstream kW", "200 .. 1920")):
@@ -173,7 +177,7 @@ def test_everything_is_counted_where_it_stands() -> None:
 def test_everything_is_listed_with_what_was_assumed() -> None:
     feeder = feeder_from_toml(EVERYTHING, "f")
     found = summary(feeder, default_study("none"))
-    text = _text(found)
+    text = check_text(found)
     assert max(map(len, text.splitlines())) <= 100
     assert sum(found["values"].values()) == len(feeder.origins)
     for said in (
@@ -207,10 +211,18 @@ def test_the_schematic_names_everything(tmp_path: Path) -> None:
 
 def test_a_feeder_without_sections_says_so() -> None:
     feeder = replace(load_feeder("paper"), sections=())
-    text = _text(summary(feeder, default_study("paper")))
+    text = check_text(summary(feeder, default_study("paper")))
     assert "\nno sections: nothing to size\n" in text
     assert "downstream kW " not in text
     assert "(given so)" in text
+
+
+def test_a_picture_without_a_name_has_the_feeders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["check", "paper", "--plot"]) == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["paper.png"]
 
 
 def test_plot_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -322,24 +322,16 @@ def test_load_steps_have_their_own_exponent(steps: Scenarios) -> None:
     assert abs(np.corrcoef(exponent, common)[0, 1]) < 5.0 / math.sqrt(N)
 
 
-def test_load_steps_are_equally_likely_in_every_section_and_uniform_in_each(
-    case: Case, steps: Scenarios
+@pytest.mark.parametrize("own", [*BREAKS, DrawClass.LOAD_STEP])
+def test_events_are_equally_likely_in_every_section_and_uniform_in_each(
+    case: Case, drawn: dict[DrawClass, Scenarios], own: DrawClass
 ) -> None:
     """Each of the paper's sections is one line, so its fraction is the distance."""
-    places = along_lines(case, steps)
+    places = along_lines(case, drawn[own])
     for line in ("R1-R2", "R2-R3", "R3-R4", "R4-R5"):
         here = np.array([name == line for name, _ in places])
         assert_share(here, 0.25)
         assert_uniform(np.array([at for name, at in places if name == line]), 0.0, 1.0)
-
-
-@pytest.mark.parametrize("own", BREAKS)
-def test_breaks_are_uniform_in_length_over_all_lines(
-    case: Case, drawn: dict[DrawClass, Scenarios], own: DrawClass
-) -> None:
-    starts = {"R1-R2": (0.0, 3.0), "R2-R3": (3.0, 5.0), "R3-R4": (8.0, 5.0), "R4-R5": (13.0, 10.0)}
-    km = [starts[name][0] + at * starts[name][1] for name, at in along_lines(case, drawn[own])]
-    assert_uniform(np.array(km), 0.0, 23.0)
 
 
 def test_breaks_open_one_phase_or_two(drawn: dict[DrawClass, Scenarios]) -> None:

@@ -50,6 +50,7 @@ def section(status: str, reason: str, remote: str = "R2", **more: Any) -> dict[s
         **{"i_set_a": 0.15, "v_set_pu": 0.0025, "z_set_ohm": 100.25, "margin": 1.3},
         **{"opens": 60000, "unreachable": 2000, "detected": 29000},
         **{"false_trips": 0, "security_trials": 230832, "false_trip_upper": 0.0001},
+        **{"line_z1_ohm": [0.3, 0.4], "least_z_op_ohm": 123.4},
         "classes": classes(),
     }
     if status in ("none", "load_side"):
@@ -90,8 +91,17 @@ def answer(local: str = "R1", remote: str = "R2", feeder: str = "made up") -> di
         row["remote"] = remote if row["remote"] == "R2" else row["remote"]
     return {
         **{"feeder": feeder, "seed": 1, "attempt": 2, "confidence": 0.95},
-        **{"sections": sections, "compared": pairs},
+        **{"sections": sections, "compared": pairs, "numerics": NUMERICS},
     }
+
+
+NUMERICS = {
+    **{"dead": 9, "floating": 0, "unearthed": 0, "not_converged": 0, "training_not_converged": 0},
+    "by_class": [
+        {"name": name, "scenarios": 4000, "dead": 0, "not_converged": 0}
+        for name in ("open_phase", "load_step")
+    ],
+}
 
 
 @pytest.mark.parametrize("step", [0.05, 0.25, 0.125, 0.001])
@@ -134,7 +144,7 @@ def test_heads_stand_above_their_values(local: str, remote: str) -> None:
     lines = sheet_table(answer(local, remote)).splitlines()
     ends = {"I_set A": "0.15", "V_set %": "0.25", "Z_set Ω": "100.25", "false trips": "230832"}
     heads = [line for line in lines if "I_set A" in line]
-    values = [line for line in lines if " 100.25 " in line]
+    values = [line for line in lines if " 0.15 " in line]
     assert (len(heads), len(values)) == (2, 6)
     for head, own in ((heads[0], values[:4]), (heads[1], values[4:])):
         for title, value in ends.items():
@@ -259,3 +269,21 @@ def test_an_assessment_says_so_and_has_no_margin() -> None:
     # nothing beside what is assessed: no comparison
     result["compared"] = [compared("assessed")]
     assert "compared" not in sheet_table(result)
+
+
+def test_what_did_not_converge_is_counted_by_class_and_only_where_there_is_any() -> None:
+    own = answer()
+    assert "did not converge" not in sheet_table(own)
+    rows = [row | {"not_converged": 3} for row in own["numerics"]["by_class"][1:]]
+    own["numerics"] = own["numerics"] | {"by_class": rows, "training_not_converged": 17}
+    said = " ".join(sheet_table(own).split())
+    assert "did not converge: 3 of 4,000 load steps, 17 scenarios of training." in said
+
+
+def test_z_set_stands_between_the_line_and_the_breaks() -> None:
+    own = answer()
+    own["sections"][1]["least_z_op_ohm"] = None
+    said = " ".join(sheet_table(own).split())
+    assert "R1→R2 0.5 / 100.25 / 123" in said
+    assert "R1→R3 0.5 / 100.25 / no break" in said
+    assert "R1→R6 0.5" not in said  # which has no setting

@@ -34,7 +34,8 @@ RESULT_KEYS = """version seed feeder study_hash confidence attempt scenarios sec
     feeder_false_trips numerics"""
 SECTION_KEYS = """local remote setting_group status reason i_set_a i_set_pu v_set_pu z_set_ohm
     dt_ms delay_ms trigger negative_sign options line_z1_ohm margin opens unreachable detected
-    dependability dependability_low dependability_high security_trials false_trips false_trip_upper
+    dependability dependability_low dependability_high least_z_op_ohm security_trials false_trips
+    false_trip_upper
     false_trips_per_year_upper classes causes nearest_false_trip fixes"""
 COMPARED_KEYS = """local remote setting_group name i_set_a v_set_pu z_set_ohm detected opens
     unreachable dependability_low dependability_high false_trips trials upper reason"""
@@ -128,7 +129,11 @@ def test_the_keys_are_the_contract_s(first: Said) -> None:
     result = first.result
     assert list(result) == RESULT_KEYS.split()
     assert list(result["feeder_false_trips"]) == ["per_year_upper", "assumptions"]
-    assert list(result["numerics"]) == ["dead", "floating", "not_converged"]
+    numerics = result["numerics"]
+    counts = ["dead", "floating", "unearthed", "not_converged"]
+    assert list(numerics) == [*counts, "training_not_converged", "by_class"]
+    for name in counts:
+        assert numerics[name] == sum(own[name] for own in numerics["by_class"])
     for row in result["sections"]:
         assert list(row) == SECTION_KEYS.split()
         for own in row["classes"]:

@@ -79,16 +79,6 @@ def test_every_region_is_as_likely_and_uniform_in_length(site: Site, name: str) 
         assert kstest(at, "uniform").pvalue > 1e-3
 
 
-@pytest.mark.parametrize("name", ["open_phase", "open_three"])
-def test_breaks_are_uniform_in_length_over_all_lines(site: Site, name: str) -> None:
-    event = draw(name, site, N)
-    lengths = [km for _, _, km in LINES.values()]
-    starts = dict(zip(LINES, np.cumsum([0.0, *lengths[:-1]]), strict=True))
-    places = [site.at(event, s) for s in range(N)]
-    km = [starts[str(p.line)] + float(p.at or 0.0) * LINES[str(p.line)][2] for p in places]
-    assert kstest(km, "uniform", args=(0.0, sum(lengths))).pvalue > 1e-3
-
-
 @pytest.mark.parametrize("name", DRAWS)
 def test_nothing_lies_to_earth_on_three_wires_but_faults(three_wire: Site, name: str) -> None:
     event = draw(name, three_wire, 200)

@@ -21,7 +21,13 @@ from openphase.model.events.line_fault import draw_line_fault
 from openphase.model.events.load_step import draw_load_step
 from openphase.model.events.load_swap import LoadSwapLaw, draw_load_swap
 from openphase.model.events.motor_start import RUNNING_POWER_FACTOR
-from openphase.model.events.shunts import LEAST_OHM, Shunt, between_phases, to_earth
+from openphase.model.events.shunts import (
+    LEAST_OHM,
+    Shunt,
+    between_phases,
+    spot_on,
+    to_earth,
+)
 
 N = 4000
 KINDS = ["site", "three_wire"]
@@ -56,7 +62,7 @@ def test_a_shunt_takes_the_power_it_is_made_of(
 ) -> None:
     site: Site = request.getfixturevalue(kind)
     va = rng.normal(size=(3, 20)) + 1j * rng.normal(size=(3, 20))
-    shunt: Shunt = make(site.network, va)
+    shunt: Shunt = make(spot_on(site.network, rng.choice(site.lines.edges, 20)), va)
     found = taken(site, shunt.earth_s, shunt.between_s)
     np.testing.assert_allclose(found, va.sum(axis=0), rtol=1e-12, atol=1e-12)
 

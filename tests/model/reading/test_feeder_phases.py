@@ -252,7 +252,7 @@ def test_a_code_has_as_many_rows_as_the_line_has_phases(code: LineCode, phases: 
     [
         {"x_ohm_per_km": ((0.8, 0.3), (0.31, 0.8))},
         {"x_ohm_per_km": ((0.8, 0.3), (0.3, -0.1))},
-        {"r_ohm_per_km": ((0.3, 0.0), (0.0, 0.0)), "x_ohm_per_km": ((0.8, 0.0), (0.0, 0.0))},
+        {"x_ohm_per_km": ((0.8, 0.0), (0.0, 0.0)), "r_ohm_per_km": ((0.3, 0.0), (0.0, 0.0))},
         {"r_ohm_per_km": ((0.3, 0.1), (0.1, -0.3))},
         {"r_ohm_per_km": ((0.3,),)},
         {"c_nf_per_km": ((9.0,),)},
@@ -261,7 +261,7 @@ def test_a_code_has_as_many_rows_as_the_line_has_phases(code: LineCode, phases: 
     ],
 )
 def test_matrices_that_are_none(change: dict[str, Any]) -> None:
-    assert accepted(codes=[TWO])
+    assert accepted(codes=[TWO, replace(ONE, x_ohm_per_km=((0.0,),))])
     assert not accepted(codes=[replace(TWO, **change)])
 
 

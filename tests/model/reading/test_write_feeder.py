@@ -28,8 +28,10 @@ from openphase.model import (
     Transformer,
     dump_feeder,
     feeder_from_toml,
+    load_feeder,
     make_feeder,
     read_feeder,
+    shipped_feeders,
     write_feeder,
 )
 from openphase.model.parts import InlineConnection, Neutral
@@ -168,7 +170,8 @@ class Draw:
         phases = self.some(there, 2 if delta else 1)
         law = self.rng.choice(["exponent", "both", "zip"])
         kvar = self.maybe(self.rng.uniform(-50, 50))
-        shares = [self.rng.uniform(-1, 2) for _ in range(4)]
+        zp, ip, zq, iq = (self.rng.uniform(-1, 2) for _ in range(4))
+        shares = (zp, ip, 1 - zp - ip, zq, iq, 1 - zq - iq)
         return Load(
             name=f"load {n}",
             transformer=None,
@@ -182,12 +185,11 @@ class Draw:
             branch_kv=self.maybe(self.rng.uniform(0.1, 8)),
             kvar=kvar,
             exponent_q=self.rng.uniform(0, 4) if law == "both" else None,
-            zip=(*shares[:2], 1 - sum(shares[:2]), *shares[2:], 1 - sum(shares[2:]))
-            if law == "zip"
-            else None,
+            zip=shares if law == "zip" else None,
             v_min_pu=self.rng.choice([0.7, 0.8]),
             v_max_pu=self.maybe(1.05),
             v_low_pu=self.maybe(0.5),
+            edge_exponent=self.maybe(0.0),
         )
 
 
@@ -337,6 +339,13 @@ def test_tables_are_called_after_the_file_and_listed_in_it(tmp_path: Path) -> No
     assert "[[loads]]" not in text
     assert 'loads = "the-town.loads.csv"' in text
     assert "[[codes]]" in text
+
+
+@pytest.mark.parametrize("name", shipped_feeders())
+def test_shipped_feeders_read_back_from_tables(name: str, tmp_path: Path) -> None:
+    feeder = load_feeder(name)
+    write_feeder(feeder, tmp_path / "f.toml", tables=True)
+    assert read_feeder(tmp_path / "f.toml") == feeder
 
 
 def test_a_file_that_cannot_be_written(tmp_path: Path) -> None:
