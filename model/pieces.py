@@ -256,14 +256,14 @@ def span(feeder: Feeder, pieces: list[Piece]) -> Span:
     """
     order, parent_piece, left = _walk(feeder.source.bus, pieces, {})
     place = {name: k for k, name in enumerate(order)}
-    forks = {n: min(pieces[n].ends, key=place.__getitem__) for n in left}
+    ends = {n: _sorted_ends(pieces[n], place) for n in left}
     if any(pieces[n].is_bare for n in left):
         # Buses that closed switches join have one voltage: all stand for the first one reached,
         # and a loop of switches alone needs no chord.
         together = _joined(pieces)
         order, parent_piece, left = _walk(feeder.source.bus, pieces, together)
-        forks = _forks(pieces, order, left, together)
-    bare = [pieces[n] for n in forks if pieces[n].is_bare]
+        ends = _chord_ends(pieces, order, left, together)
+    bare = [pieces[n] for n in ends if pieces[n].is_bare]
     if bare:
         raise InputError.single(
             feeder.name,
@@ -271,14 +271,13 @@ def span(feeder: Feeder, pieces: list[Piece]) -> Span:
             "no impedance where the loop closes",
             "must close over a line, a transformer or a regulator with `z_ohm`",
         )
-    chords = sorted(forks)
-    tails = [next(end for end in pieces[n].ends[::-1] if end != forks[n]) for n in chords]
+    chords = sorted(ends)
     return Span(
         order=order,
         parent_piece=parent_piece,
         chords=tuple(pieces[n] for n in chords),
-        forks=tuple(forks[n] for n in chords),
-        tails=tuple(tails),
+        forks=tuple(ends[n][0] for n in chords),
+        tails=tuple(ends[n][1] for n in chords),
     )
 
 
@@ -294,22 +293,31 @@ def _joined(pieces: list[Piece]) -> dict[str, list[str]]:
     return together
 
 
-def _forks(
+def _sorted_ends(piece: Piece, place: dict[str, int]) -> tuple[str, str]:
+    """The end that was reached first, and the other."""
+    first, second = piece.ends
+    return (first, second) if place[first] <= place[second] else (second, first)
+
+
+def _chord_ends(
     pieces: list[Piece],
     order: list[str],
     left: list[int],
     together: dict[str, list[str]],
-) -> dict[int, str]:
-    """The fork of every piece left over, but for switches that close a loop of switches."""
+) -> dict[int, tuple[str, str]]:
+    """Fork and tail of every piece left over, but for switches that close a loop of switches.
+
+    The fork is the bus that stands for the end that was reached first.
+    """
     place = {name: k for k, name in enumerate(order)}
-    forks = {}
+    found = {}
     for n in left:
-        upper, lower = sorted(pieces[n].ends, key=place.__getitem__)
+        upper, lower = _sorted_ends(pieces[n], place)
         group = together.get(upper, [upper])
         if pieces[n].is_switch and lower in group:
             continue
-        forks[n] = min(group, key=place.__getitem__)
-    return forks
+        found[n] = (min(group, key=place.__getitem__), lower)
+    return found
 
 
 def _other(piece: Piece, end: str) -> str:
