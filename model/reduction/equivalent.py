@@ -289,4 +289,4 @@ def _of_units(basis: NDArray[np.float64], z: Complex, loads: Complex, paired: bo
 def _passive(z: Complex, loads: Complex) -> Complex:
     """No negative resistance, and some reactance."""
     least = LEAST_Z / float(np.abs(loads).max())
-    return np.maximum(z.real, 0.0) + 1j * np.maximum(z.imag, least)
+    return np.maximum(z.real, 0.0) + 1j * np.where(z.imag > 0.0, z.imag, least)
