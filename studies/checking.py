@@ -16,8 +16,8 @@ from ..model.events.phases import count_phases
 from ..model.network import Network, assumed_connection, compile_network
 from ..model.parts import Der, Feeder, InlineTransformer, Load, Place, Regulator, Switch
 from ..model.points import Terminal, find_points
-from ..model.sides import Side
 from ..model.reading.provenance import assumptions, count_origins
+from ..model.sides import Side
 from .loading import load_with_points
 from .run.store import as_json
 from .show.check_text import check_text
@@ -86,6 +86,7 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
     level, each = study.loads.level.support, study.loads.each.support
     units = [unit for unit in feeder.transformers if inside.holds(unit.place)]
     behind = {unit.name for unit in units}
+    inline = [unit for unit in feeder.inline_transformers if inside.joins(unit)]
 
     def hanging(parts: Iterable[Load | Der]) -> list[str]:
         return [p.name for p in parts if p.transformer in behind or inside.holds(p.place)]
@@ -99,11 +100,7 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "downstream_kw": [far * level[0] * each[0], near * level[1] * each[1]],
         "downstream_kw_nominal": [far, near],
         "units": [unit.name for unit in units],
-        "yg_d": [
-            unit.name
-            for unit in (*units, *filter(inside.joins, feeder.inline_transformers))
-            if unit.connection == "Yg/D"
-        ],
+        "yg_d": [unit.name for unit in (*units, *inline) if unit.connection == "Yg/D"],
         "yg_d_sampled": [unit.name for unit in units if unit.name in study.transformers.yg_d],
         # on three wires an unknown unit has no neutral to be Yg by
         "yg_d_unknown": [
@@ -112,12 +109,8 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "loads": hanging(feeder.loads),
         "ders": hanging(feeder.ders),
         "capacitors": [bank.name for bank in feeder.capacitors if inside.holds(bank.place)],
-        "inline_transformers": [p.name for p in feeder.inline_transformers if inside.joins(p)],
-        "shifted_by": [
-            p.name
-            for p in feeder.inline_transformers
-            if inside.joins(p) and p.connection in SHIFTING
-        ],
+        "inline_transformers": [unit.name for unit in inline],
+        "shifted_by": [unit.name for unit in inline if unit.connection in SHIFTING],
         "regulators": [part.name for part in feeder.regulators if inside.joins(part)],
         "switches": [part.name for part in feeder.switches if part.closed and inside.joins(part)],
     }
