@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .inline import TwoPort, regulator_impedance, two_port
 from .parts import Feeder
-from .pieces import NO_PHASES, Piece
+from .pieces import NO_PHASES, Piece, Span
 from .units import regulator_rows
 
 __all__ = ["Edges", "hang_edges"]
@@ -31,18 +31,21 @@ class Edges:
     shunt_s: Complex  #: (B, 3, 3) charging and open windings, on the nodes
 
 
-def hang_edges(feeder: Feeder, pieces: list[Piece | None], index: dict[str, int]) -> Edges:
-    """Edge k of the tree ends at node k; the chords follow."""
-    count, chords = len(index), len(pieces) - len(index)
-    upper, lower, upward = _ends(pieces, index)
+def hang_edges(feeder: Feeder, pieces: list[Piece | None], spanned: Span, touched: Int) -> Edges:
+    """Edge k of the tree ends at node k; the chords follow.
+
+    ``touched`` (B,) are the phases of each node that something hangs on.
+    """
+    count, chords = len(spanned.order), len(spanned.chords)
+    upper, lower, upward = _ends(pieces, spanned)
     parent = upper[:count]
     carried = _chains(parent, lower[count:], upper[count:])
     in_loop = carried.any(axis=1)
-    node_phases = _node_phases(pieces, upper, lower, upward, count)
+    node_phases = _all_touched(pieces, upper, lower, upward, touched)
     end_y = np.array([NO_PHASES if p is None else p.end_y_s for p in pieces])
     z = np.array([NO_PHASES if p is None else p.z_ohm for p in pieces])
-    regulator = regulator_rows(feeder, pieces[:count])
-    ports = _ports(pieces[:count], upward)
+    regulator = regulator_rows(feeder, pieces)
+    ports = _ports(pieces, upward)
     for k, port in ports.items():
         z[k] = port.z_ohm
     for k in np.flatnonzero(regulator >= 0).tolist():
@@ -51,16 +54,19 @@ def hang_edges(feeder: Feeder, pieces: list[Piece | None], index: dict[str, int]
     np.add.at(shunt, upper[1:], end_y[1:])
     np.add.at(shunt, lower[1:], end_y[1:])
     for k, port in ports.items():
-        shunt[upper[k]] += port.shunt_s
-    loose_from, loose = _loose(pieces[:count], ports, upward, parent, node_phases)
-    transformer = np.full(count, -1, np.int64)
+        # a chord is met from its tail, which `upper` names last
+        shunt[upper[k] if k < count else lower[k]] += port.shunt_s
+    loose_from, loose = _loose(pieces[:count], ports, upward, node_phases)
+    transformer = np.full(len(pieces), -1, np.int64)
     transformer[list(ports)] = np.arange(len(ports))
     phases = np.array([ALL if p is None else p.phases[0] & p.phases[1] for p in pieces], np.int64)
-    plain = (regulator < 0) & (transformer < 0) & ~in_loop & (np.diff(loose_from) == 0)
+    turned = (regulator >= 0) | (transformer >= 0)
+    plain = ~turned[:count] & ~in_loop & (np.diff(loose_from) == 0)
     lone = [
         PHASE_OF.get(int(phases[k]), -1) if plain[k] and phases[k] == node_phases[k] else -1
         for k in range(count)
     ]
+    chord_edges = range(count, len(pieces))
     return Edges(
         fields={
             "parent": parent,
@@ -79,9 +85,9 @@ def hang_edges(feeder: Feeder, pieces: list[Piece | None], index: dict[str, int]
             "in_loop": in_loop,
             "fork": upper[count:],
             "tail": lower[count:],
-            "chord_y_s": np.array([_inverse(m) for m in z[count:]], np.complex128).reshape(
-                -1, 3, 3
-            ),
+            "chord_y_s": np.array(
+                [_chord_admittance(pieces[k], z[k], bool(upward[k])) for k in chord_edges], z.dtype
+            ).reshape(-1, 3, 3),
             "alone": np.eye(chords, dtype=np.bool_),
         },
         upward=upward,
@@ -89,12 +95,13 @@ def hang_edges(feeder: Feeder, pieces: list[Piece | None], index: dict[str, int]
     )
 
 
-def _ends(pieces: list[Piece | None], index: dict[str, int]) -> tuple[Int, Int, NDArray[np.bool_]]:
+def _ends(pieces: list[Piece | None], spanned: Span) -> tuple[Int, Int, NDArray[np.bool_]]:
     """Upper and lower node of every edge, and whether its piece leads downwards.
 
     A tree edge leads down to its own node; a chord's current is counted from its tail, the
     lower node, so that it leads upwards from there.
     """
+    index = {name: k for k, name in enumerate(spanned.order)}
     count = len(index)
     upper, lower = np.full(len(pieces), -1, np.int64), np.zeros(len(pieces), np.int64)
     upward = np.ones(len(pieces), np.bool_)
@@ -106,7 +113,7 @@ def _ends(pieces: list[Piece | None], index: dict[str, int]) -> tuple[Int, Int, 
             upward[k] = second == k
             upper[k], lower[k] = (first, second) if upward[k] else (second, first)
         else:
-            upper[k], lower[k] = min(first, second), max(first, second)
+            upper[k], lower[k] = index[spanned.forks[k - count]], index[spanned.tails[k - count]]
             upward[k] = first == lower[k]
     return upper, lower, upward
 
@@ -122,26 +129,17 @@ def _chains(parent: Int, tail: Int, fork: Int) -> NDArray[np.bool_]:
     return carried
 
 
-def _node_phases(
-    pieces: list[Piece | None], upper: Int, lower: Int, upward: NDArray[np.bool_], count: int
+def _all_touched(
+    pieces: list[Piece | None], upper: Int, lower: Int, upward: NDArray[np.bool_], touched: Int
 ) -> Int:
-    """(B,) the phases that reach every node, over any edge."""
-    phases = np.zeros(count, np.int64)
+    """(B,) the phases of each node that a conductor or anything else touches."""
+    phases = touched.copy()
     phases[0] = ALL
-    grown = True
-    while grown:
-        before = phases.copy()
-        for k, piece in enumerate(pieces):
-            if piece is None:
-                continue
-            ends = (int(upper[k]), int(lower[k]))
-            masks = piece.phases if upward[k] == (k < count) else piece.phases[::-1]
-            for near, far, mask, there in ((*ends, *masks), (*ends[::-1], *masks[::-1])):
-                if piece.bank is not None:
-                    phases[far] |= there if phases[near] & mask else 0
-                else:
-                    phases[far] |= phases[near] & mask
-        grown = bool((phases != before).any())
+    for k, piece in enumerate(pieces):
+        if piece is not None:
+            above, below = piece.phases if upward[k] == (k < touched.size) else piece.phases[::-1]
+            phases[upper[k]] |= above
+            phases[lower[k]] |= below
     return phases
 
 
@@ -158,16 +156,18 @@ def _loose(
     pieces: list[Piece | None],
     ports: dict[int, TwoPort],
     upward: NDArray[np.bool_],
-    parent: Int,
     node_phases: Int,
 ) -> tuple[Int, NDArray[np.float64]]:
-    """The modes that each edge leaves loose at its lower end."""
+    """The modes that each edge leaves loose at its lower end.
+
+    Where it does not bring a phase that exists there, that is fed by a loop, or dead.
+    """
     start = [0]
     modes: list[NDArray[np.float64]] = []
     for k, piece in enumerate(pieces):
         if piece is not None:
             above, below = piece.phases if upward[k] else piece.phases[::-1]
-            brought = below if k in ports else int(node_phases[parent[k]]) & above
+            brought = below if k in ports else above
             missing = int(node_phases[k]) & ~brought
             if k in ports:
                 modes += list(ports[k].modes)
@@ -176,8 +176,11 @@ def _loose(
     return np.array(start, np.int64), np.array(modes, np.float64).reshape(-1, 3)
 
 
-def _inverse(z: Complex) -> Complex:
-    """Of the phases that are there; zero elsewhere."""
+def _chord_admittance(piece: Piece | None, z: Complex, upward: bool) -> Complex:
+    """(3, 3) of a chord seen from its fork, its other end at zero volts."""
+    if piece is not None and piece.bank_s is not None:
+        far = slice(3, 6) if upward else slice(0, 3)
+        return piece.bank_s[far, far]
     there = np.flatnonzero(np.abs(z).max(axis=1) > 0.0)
     y = np.zeros((3, 3), np.complex128)
     y[np.ix_(there, there)] = np.linalg.inv(z[np.ix_(there, there)])

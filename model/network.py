@@ -18,13 +18,15 @@ from .edges import hang_edges
 from .laws import law_rows, own_exponents
 from .machines import Machines, machines_of
 from .neutrals import bus_neutrals
-from .parts import Feeder, Source
-from .pieces import Piece, check_fed, detached_end, node_name, pieces_of, place_of, span
+from .parts import Capacitor, Feeder, Load, Source
+from .phases import phase_mask
+from .pieces import ALL_PHASES, Piece, check_fed, detached_end, node_name, pieces_of, place_of, span
 from .states import Tree
 from .symmetrical import phase_matrix
 from .units import (
     CONNECTIONS,
     Nodes,
+    Unit,
     assumed_connection,
     capacitor_shunts,
     connection_of,
@@ -167,14 +169,16 @@ def compile_network(
     if closed is None:
         closed = frozenset(s.name for s in feeder.switches if s.closed)
     pieces = pieces_of(feeder, closed, opened)
-    order, parent_piece, chords = span(feeder, pieces)
+    spanned = span(feeder, pieces)
+    order = spanned.order
     check_fed(feeder, pieces, order)
-    edge_pieces = [None, *(pieces[parent_piece[n]] for n in order[1:]), *chords]
+    below = [pieces[spanned.parent_piece[name]] for name in order[1:]]
+    edge_pieces = [None, *below, *spanned.chords]
     index = {name: k for k, name in enumerate(order)}
-    edges = hang_edges(feeder, edge_pieces, index)
+    units = units_of(feeder, motors)
+    edges = hang_edges(feeder, edge_pieces, spanned, _touched(feeder, units, order))
     buses = _buses_of(feeder, pieces, order)
     nodes = Nodes(row=index, volts=_at_nodes(bus_volts(feeder), buses))
-    units = units_of(feeder, motors)
     machines = machines_of(feeder, units, motors)
     unit_node = np.array([index[node_name(feeder, place_of(u))] for u in units], np.int64)
     unit_part = unit_arrays(feeder, units, machines, nodes.volts[unit_node])
@@ -216,6 +220,18 @@ def compile_network(
         three_wire=feeder.source.wires == 3,
         neutral=_at_nodes(bus_neutrals(feeder), buses).astype(np.bool_),
     )
+
+
+def _touched(feeder: Feeder, units: list[Unit], order: list[str]) -> NDArray[np.int64]:
+    """(B,) bit mask of the phases of each node that something hangs on."""
+    masks = dict.fromkeys(order, 0)
+    for unit in units:
+        masks[node_name(feeder, place_of(unit))] |= ALL_PHASES
+    hanging: list[Load | Capacitor] = [*feeder.loads, *feeder.capacitors]
+    for part in hanging:
+        if part.place is not None:
+            masks[node_name(feeder, part.place)] |= phase_mask(part.phases)
+    return np.array([masks[name] for name in order], np.int64)
 
 
 def _neutral_y(source: Source) -> complex:

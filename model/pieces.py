@@ -27,8 +27,10 @@ from .parts import (
 from .phases import conductors, phase_mask
 
 __all__ = [
+    "ALL_PHASES",
     "NO_PHASES",
     "Piece",
+    "Span",
     "check_fed",
     "detached_end",
     "node_name",
@@ -37,6 +39,7 @@ __all__ = [
     "span",
 ]
 
+ALL_PHASES = 0b111
 NO_PHASES: NDArray[np.complex128] = np.zeros((3, 3), np.complex128)
 
 
@@ -55,6 +58,24 @@ class Piece:
     z_ohm: NDArray[np.complex128]  #: (3, 3)
     end_y_s: NDArray[np.complex128]  #: (3, 3) half of the charging
     bank_s: NDArray[np.complex128] | None = None  #: (6, 6) admittance of a bank
+    has_drop: bool = False  #: of a regulator: it has impedance
+
+    @property
+    def is_switch(self) -> bool:
+        """Whether nothing but a closed switch joins the ends."""
+        return self.line is None and self.regulator is None and self.bank is None
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether nothing lies between the ends that a voltage could drop at."""
+        return self.line is None and self.bank is None and not self.has_drop
+
+    @property
+    def label(self) -> str:
+        """As messages call it."""
+        kind = "switch" if self.is_switch else "regulator" if self.regulator else "transformer"
+        name = self.line or self.regulator or self.bank
+        return f"{kind} '{name}'" if name else f"the {kind} '{self.ends[0]}'–'{self.ends[1]}'"
 
     @property
     def key(self) -> tuple[str | None, tuple[str, str]]:
@@ -62,9 +83,23 @@ class Piece:
         return self.line or self.bank or self.regulator, self.ends
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """A spanning tree of a network, and what closes its loops."""
+
+    order: list[str]  #: node names, parents before children
+    parent_piece: dict[str, int]  #: the piece between each node and its parent
+    chords: tuple[Piece, ...]
+    forks: tuple[str, ...]  #: upper node of each chord, an ancestor of its tail
+    tails: tuple[str, ...]
+
+
 def check_fed(feeder: Feeder, pieces: list[Piece], order: list[str]) -> None:
     """Every bus hangs on the source, one way or another."""
-    apart = {end for piece in pieces for end in piece.ends} - set(order)
+    parts: list[Line | Switch | Regulator | InlineTransformer]
+    parts = [*feeder.lines, *feeder.switches, *feeder.regulators, *feeder.inline_transformers]
+    buses = {bus for part in parts for bus in (part.from_bus, part.to_bus)}
+    apart = (buses | {end for piece in pieces for end in piece.ends}) - set(order)
     if apart:
         names = ", ".join(repr(name) for name in sorted(apart))
         raise InputError.single(
@@ -131,7 +166,8 @@ def pieces_of(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) ->
         mask = phase_mask(conductors(part) if isinstance(part, Regulator) else part.phases)
         name = part.name if isinstance(part, Regulator) else None
         ends = (part.from_bus, part.to_bus)
-        pieces.append(_without_length(ends, (mask, mask), regulator=name))
+        drop = isinstance(part, Regulator) and part.z_ohm != 0.0
+        pieces.append(_without_length(ends, (mask, mask), regulator=name, has_drop=drop))
     return pieces + _banks(feeder)
 
 
@@ -142,6 +178,7 @@ def _without_length(
     regulator: str | None = None,
     bank: str | None = None,
     bank_s: NDArray[np.complex128] | None = None,
+    has_drop: bool = False,
 ) -> Piece:
     return Piece(
         line=None,
@@ -155,6 +192,7 @@ def _without_length(
         z_ohm=NO_PHASES,
         end_y_s=NO_PHASES,
         bank_s=bank_s,
+        has_drop=has_drop,
     )
 
 
@@ -211,32 +249,67 @@ def _cut(
     ]
 
 
-def span(feeder: Feeder, pieces: list[Piece]) -> tuple[list[str], dict[str, int], list[Piece]]:
-    """Node names in depth-first order, each node's piece to its parent, and the chords.
+def span(feeder: Feeder, pieces: list[Piece]) -> Span:
+    """Span the network by a tree; what is left over, with impedance, are the chords.
 
-    Depth-first, so that what is left over joins a node to an ancestor of its own: its fork. A
-    chord is a line, which has impedance: where a switch, say, is left over, the loop's other
-    piece at the fork takes its place, which leads from there into the loop.
+    Depth-first, so that every chord joins a node to an ancestor of its own, its fork.
     """
-    without: set[int] = set()
-    while True:
-        order, parent_piece, left = _walk(feeder.source.bus, pieces, without)
-        bare = [n for n in left if pieces[n].line is None]
-        if not bare:
-            return order, parent_piece, [pieces[n] for n in sorted({*left, *without})]
-        back = pieces[bare[0]]
-        place = {name: n for n, name in enumerate(order)}
-        fork, tail = sorted(back.ends, key=place.__getitem__)
-        while (up := _other(pieces[parent_piece[tail]], tail)) != fork:
-            tail = up
-        if pieces[parent_piece[tail]].line is None:
-            raise InputError.single(
-                feeder.name,
-                f"switches: the loop at bus '{fork}'",
-                "two switches, regulators or transformers",
-                "must leave the bus by a line on one side at least",
-            )
-        without.add(parent_piece[tail])
+    order, parent_piece, left = _walk(feeder.source.bus, pieces, {})
+    place = {name: k for k, name in enumerate(order)}
+    forks = {n: min(pieces[n].ends, key=place.__getitem__) for n in left}
+    if any(pieces[n].is_bare for n in left):
+        # Buses that closed switches join have one voltage: all stand for the first one reached,
+        # and a loop of switches alone needs no chord.
+        together = _joined(pieces)
+        order, parent_piece, left = _walk(feeder.source.bus, pieces, together)
+        forks = _forks(pieces, order, left, together)
+    bare = [pieces[n] for n in forks if pieces[n].is_bare]
+    if bare:
+        raise InputError.single(
+            feeder.name,
+            f"the loop over {bare[0].label}",
+            "no impedance where the loop closes",
+            "must close over a line, a transformer or a regulator with `z_ohm`",
+        )
+    chords = sorted(forks)
+    tails = [next(end for end in pieces[n].ends[::-1] if end != forks[n]) for n in chords]
+    return Span(
+        order=order,
+        parent_piece=parent_piece,
+        chords=tuple(pieces[n] for n in chords),
+        forks=tuple(forks[n] for n in chords),
+        tails=tuple(tails),
+    )
+
+
+def _joined(pieces: list[Piece]) -> dict[str, list[str]]:
+    """Every bus that closed three-phase switches join to others, and all of these."""
+    together: dict[str, list[str]] = {}
+    for piece in pieces:
+        if piece.is_switch and piece.phases[0] == ALL_PHASES:
+            one, other = (together.get(end, [end]) for end in piece.ends)
+            if one is not other:
+                both = [*one, *other]
+                together |= dict.fromkeys(both, both)
+    return together
+
+
+def _forks(
+    pieces: list[Piece],
+    order: list[str],
+    left: list[int],
+    together: dict[str, list[str]],
+) -> dict[int, str]:
+    """The fork of every piece left over, but for switches that close a loop of switches."""
+    place = {name: k for k, name in enumerate(order)}
+    forks = {}
+    for n in left:
+        upper, lower = sorted(pieces[n].ends, key=place.__getitem__)
+        group = together.get(upper, [upper])
+        if pieces[n].is_switch and lower in group:
+            continue
+        forks[n] = min(group, key=place.__getitem__)
+    return forks
 
 
 def _other(piece: Piece, end: str) -> str:
@@ -244,14 +317,20 @@ def _other(piece: Piece, end: str) -> str:
 
 
 def _walk(
-    root: str, pieces: list[Piece], without: set[int]
+    root: str, pieces: list[Piece], together: dict[str, list[str]]
 ) -> tuple[list[str], dict[str, int], list[int]]:
-    """Depth-first walk; returns order, parent pieces, and pieces to known nodes left over."""
+    """Depth-first walk; returns order, parent pieces, and pieces to known nodes left over.
+
+    Buses that are ``together`` are entered one straight after the other, and what has no
+    impedance is walked before lines are.
+    """
     touching: dict[str, list[int]] = defaultdict(list)
-    for n, piece in enumerate(pieces):
-        if n not in without:
-            for end in piece.ends:
-                touching[end].append(n)
+    ranks = list(range(len(pieces)))
+    if together:
+        ranks.sort(key=lambda n: (not pieces[n].is_bare, pieces[n].line is not None, n))
+    for n in ranks:
+        for end in pieces[n].ends:
+            touching[end].append(n)
     order: list[str] = []
     parent_piece: dict[str, int] = {}
     used: set[int] = set()
@@ -269,7 +348,33 @@ def _walk(
         order.append(name)
         if came >= 0:
             parent_piece[name] = came
-        for n in reversed(touching[name]):
-            if n not in used:
-                stack.append((_other(pieces[n], name), n))
+        entered = [name]
+        if name in together:
+            entered = _enter(name, pieces, touching, parent_piece, used, set(together[name]))
+            order += entered[1:]
+        for member in reversed(entered):
+            for n in reversed(touching[member]):
+                if n not in used:
+                    stack.append((_other(pieces[n], member), n))
     return order, parent_piece, left
+
+
+def _enter(
+    name: str,
+    pieces: list[Piece],
+    touching: dict[str, list[int]],
+    parent_piece: dict[str, int],
+    used: set[int],
+    members: set[str],
+) -> list[str]:
+    """All buses joined to ``name`` by switches, each after the one that it hangs on."""
+    entered = [name]
+    for member in entered:
+        for n in touching[member]:
+            far = _other(pieces[n], member)
+            joins = pieces[n].is_switch and pieces[n].phases[0] == ALL_PHASES
+            if joins and n not in used and far in members and far not in entered:
+                used.add(n)
+                parent_piece[far] = n
+                entered.append(far)
+    return entered

@@ -148,7 +148,7 @@ def _said(trunk: Trunk, points: Sequence[Point], count: int, found: int) -> list
     said = [
         f"no measuring points are given: {found} places are spread evenly by |Z1| along the "
         f"three-phase path of {trunk.kv_ll:.4g} kV from {trunk.head} to {trunk.end} "
-        f"({km:.3g} km, {total:.3g} Ω), where {trunk.ends_at} is the farthest",
+        f"({km:.3g} km, {total:.3g} Ω): {trunk.ends_at}",
         "points: "
         + ", ".join(f"{p.name} at {p.bus} on {p.line} ({so_far[p.bus]:.3g} Ω)" for p in points),
     ]

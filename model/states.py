@@ -38,7 +38,8 @@ class Tree(NamedTuple):
 
     Node k hangs on ``parent[k]`` by edge k; node 0 is the source bus, its edge the source
     impedance. Parents come before children. Edges B to B + C - 1 are chords, which close loops:
-    each is a line from its ``tail`` to an ancestor of that node, its ``fork``.
+    each leads from its ``tail`` to an ancestor of that node, its ``fork``; what would stand at
+    its upper end stands at its tail.
     At the upper end of an edge may stand a regulator or a transformer: what arrives below it is
     the voltage above times a matrix. At its lower end it may leave modes of the voltage loose,
     into which it feeds no current: the common mode behind an ungrounded winding, or a phase
@@ -52,9 +53,9 @@ class Tree(NamedTuple):
     lone_phase: Int  #: (B,) of a plain edge with one phase, to a node with one; else -1
     end_y_s: Complex  #: (B + C, 3, 3) charging at each end of the edge, half of all it has
     charged: bool  #: any edge has charging
-    regulator: Int  #: (B,) row of ``State.ratio`` at the edge's upper end; -1: none
+    regulator: Int  #: (B + C,) row of ``State.ratio`` at the edge's upper end; -1: none
     reference: Int  #: (R, 3) phase that a regulator's phase refers to, -1: earth
-    transformer: Int  #: (B,) row of ``turn``; -1: none
+    transformer: Int  #: (B + C,) row of ``turn``; -1: none
     turn: Complex  #: (N, 3, 3) open-circuit voltage below per voltage above
     loose_from: Int  #: (B + 1,) edge k has the modes ``loose_from[k]`` to ``loose_from[k + 1]``
     loose: Real  #: (M, 3) the modes

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 from .buses import bus_volts
 from .line_matrices import z1_ohm
-from .parts import Feeder, InlineTransformer, Line, Place, Regulator, Switch
-from .zones import outwards
+from .parts import Feeder, InlineTransformer, Line, Regulator, Switch
+from .zones import nodes_of, outwards
 
 __all__ = ["Step", "Trunk", "find_trunk"]
 
 ROOT = 3.0**0.5
 MEDIUM_KV = (1.0, 60.0)  #: line to line; what has less is low voltage
+LEAST_LOAD = 0.01  #: share of the feeder's load that makes a bus worth reaching
 AT_HEAD = 0.02  #: share of the path's |Z1| within which a regulator belongs to the substation
 
 Joint = Line | Switch | Regulator
@@ -41,7 +42,7 @@ class Trunk:
     head: str
     end: str
     kv_ll: float
-    ends_at: str  #: what stands at its end
+    ends_at: str  #: why it ends there
 
 
 def find_trunk(feeder: Feeder) -> Trunk | None:
@@ -50,8 +51,8 @@ def find_trunk(feeder: Feeder) -> Trunk | None:
     It lies in that medium-voltage network, between the in-line transformers, which has the most
     three-phase line (of a low-voltage feeder, in that low-voltage network). Its head is where
     the source feeds that network, behind regulators that stand there. Ways are measured by
-    |Z1|; the end is the three-phase load, or transformer that leaves this network, which is
-    farthest from the head.
+    |Z1|; the end is the farthest bus that has or feeds load on all three phases, at least a
+    hundredth of the feeder's.
     """
     volts = bus_volts(feeder)
     joined, fed = _joined(feeder), tuple(outwards(feeder))
@@ -148,28 +149,44 @@ def _ways(
 
 
 def _farthest(feeder: Feeder, distance: dict[str, float]) -> tuple[str, str]:
-    """The farthest bus of those with a three-phase load, and what stands there."""
+    """The farthest bus that feeds enough load on all three phases, and why it is the end."""
+    fed, kw = _fed(feeder)
+    least = LEAST_LOAD * kw[feeder.source.bus]
+    there = [
+        bus
+        for bus, ohm in distance.items()
+        if ohm > 0.0 and len(fed[bus]) == 3 and kw[bus] >= least
+    ]
+    why = f"no three-phase line goes farther to {LEAST_LOAD * 100:g} % of the load on all phases"
+    if not there:
+        there, why = list(distance), "no three-phase load is on the way, and no bus farther"
+    return max(there, key=lambda bus: distance[bus]), why
+
+
+def _fed(feeder: Feeder) -> tuple[dict[str, set[str]], dict[str, float]]:
+    """Phases that take load at every bus or beyond it as the source feeds them, and their kW."""
+    before = outwards(feeder)
+    place = {bus: n for n, bus in enumerate(before)}
+    fed: dict[str, set[str]] = {bus: set() for bus in before}
+    kw = dict.fromkeys(before, 0.0)
     ends = {line.name: (line.from_bus, line.to_bus) for line in feeder.lines}
-    there: dict[str, str] = {}
-
-    def note(place: Place, what: str) -> None:
-        buses = ends[place.line] if place.line is not None else (place.bus or "",)
-        known = [bus for bus in buses if bus in distance]
+    for load, (kind, name) in zip(feeder.loads, nodes_of(feeder, feeder.loads), strict=True):
+        buses = (name,) if kind == "bus" else ends[name]
+        known = [bus for bus in buses if bus in place]
         if known:
-            there.setdefault(max(known, key=lambda bus: distance[bus]), what)
-
-    for load in feeder.loads:
-        if load.place is not None and len(load.phases) == 3:
-            note(load.place, f"the load {load.name}")
-    for unit in feeder.transformers:
-        note(unit.place, f"the transformer {unit.name}")
-    for inline in feeder.inline_transformers:
-        if _is_whole(inline):
-            note(Place(bus=inline.from_bus), f"the transformer {inline.name}")
-    if not any(distance[bus] > 0.0 for bus in there):
-        there = dict.fromkeys(distance, "a three-phase bus; no three-phase load lies on the way")
-    end = max(there, key=lambda bus: distance[bus])
-    return end, there[end]
+            phases = load.phases if load.transformer is None else "abc"
+            bus = max(known, key=lambda bus: place[bus])
+            fed[bus] |= set(phases)
+            kw[bus] += load.kw
+    for bus, step in reversed(before.items()):
+        if step is not None and fed[bus]:
+            near, part = step
+            own = fed[bus] & set(part.phases)
+            if isinstance(part, InlineTransformer):
+                own = set(part.phases if part.from_bus == near else part.to_phases)
+            fed[near] |= own
+            kw[near] += kw[bus]
+    return fed, kw
 
 
 def _steps(path: list[Way], ohm: dict[str, float]) -> list[Step]:

@@ -7,7 +7,7 @@ remains joined is a zone. Switches count in their normal state.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from .parts import (
@@ -25,12 +25,22 @@ from .parts import (
     Transformer,
 )
 
-__all__ = ["Node", "Zones", "adjacent_sections", "nodes_of", "outwards", "zones_of"]
+__all__ = [
+    "Edge",
+    "Node",
+    "Zones",
+    "adjacent_sections",
+    "nodes_of",
+    "outwards",
+    "section_paths",
+    "zones_of",
+]
 
 Node = tuple[str, str]
 """``("bus", name)``, or ``("line", name)`` for what lies between a line's two ends."""
 
 Joined = Mapping[Node, Sequence[Node]]
+Edge = Line | Switch | Regulator | InlineTransformer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +107,7 @@ def adjacent_sections(
     pair for each remote point. Where two points feed a zone that has no other, they are a pair.
     """
     zones, joined = zones_of(feeder, points), _joined(feeder, points)
-    sections: list[Section] = []
+    chosen: list[tuple[int, int]] = []
     left_out: list[str] = []
     for number, (entries, exits) in enumerate(zip(zones.entries, zones.exits, strict=True)):
         pairs = [(entry, remote) for entry in entries[:1] for remote in exits]
@@ -110,26 +120,49 @@ def adjacent_sections(
         for local, remote in pairs:
             ends = [_inner_side(points[n], zones, number) for n in (local, remote)]
             if _has_line_between(joined, *ends):
-                sections.append(Section(local=points[local].name, remote=points[remote].name))
+                chosen.append((local, remote))
+    sections = (Section(local=points[a].name, remote=points[b].name) for a, b in sorted(chosen))
     return tuple(sections), tuple(left_out)
 
 
-def outwards(feeder: Feeder) -> Iterator[str]:
-    """Buses in the order of their distance from the source, in edges."""
-    joined: defaultdict[str, list[str]] = defaultdict(list)
+def outwards(feeder: Feeder) -> dict[str, tuple[str, Edge] | None]:
+    """Buses in the order of their distance from the source in edges, switches as they are.
+
+    With each comes the bus before it and what joins the two; None for the source's bus.
+    """
+    joined: defaultdict[str, list[tuple[str, Edge]]] = defaultdict(list)
     closed = (switch for switch in feeder.switches if switch.closed)
-    parts: list[Line | Switch | Regulator | InlineTransformer] = [*feeder.lines, *closed]
+    parts: list[Edge] = [*feeder.lines, *closed]
     for part in [*parts, *feeder.regulators, *feeder.inline_transformers]:
-        joined[part.from_bus].append(part.to_bus)
-        joined[part.to_bus].append(part.from_bus)
-    seen, waiting = {feeder.source.bus}, deque([feeder.source.bus])
+        joined[part.from_bus].append((part.to_bus, part))
+        joined[part.to_bus].append((part.from_bus, part))
+    found: dict[str, tuple[str, Edge] | None] = {feeder.source.bus: None}
+    waiting = deque([feeder.source.bus])
     while waiting:
         bus = waiting.popleft()
-        yield bus
-        for far in joined[bus]:
-            if far not in seen:
-                seen.add(far)
+        for far, part in joined[bus]:
+            if far not in found:
+                found[far] = bus, part
                 waiting.append(far)
+    return found
+
+
+def section_paths(feeder: Feeder) -> tuple[tuple[str, ...], ...]:
+    """Lines between the two points of every section, by the fewest edges, for a picture."""
+    cut, whole = _joined(feeder, feeder.points), _joined(feeder, ())
+    at = {point.name: point for point in feeder.points}
+    paths = []
+    for section in feeder.sections:
+        one, other = at[section.local], at[section.remote]
+        ways = [
+            _way(cut, start, end)
+            for start in (("bus", one.bus), ("line", one.line))
+            for end in (("bus", other.bus), ("line", other.line))
+        ]
+        found = [way for way in ways if way]
+        nodes = found[0] if found else _way(whole, ("bus", one.bus), ("bus", other.bus))
+        paths.append(tuple(name for kind, name in nodes if kind == "line"))
+    return tuple(paths)
 
 
 def _joined(feeder: Feeder, points: Iterable[Point]) -> Joined:
@@ -213,6 +246,11 @@ def _inner_side(point: Point, zones: Zones, zone: int) -> Node:
 
 def _has_line_between(joined: Joined, start: Node, end: Node) -> bool:
     """Whether the shortest way between two nodes of a zone has any line on it."""
+    return any(kind == "line" for kind, _ in _way(joined, start, end))
+
+
+def _way(joined: Joined, start: Node, end: Node) -> list[Node]:
+    """Nodes of the shortest way, ends included; none where there is no way."""
     before: dict[Node, Node | None] = {start: None}
     waiting = deque([start])
     while waiting and end not in before:
@@ -221,9 +259,9 @@ def _has_line_between(joined: Joined, start: Node, end: Node) -> bool:
             if far not in before:
                 before[far] = here
                 waiting.append(far)
-    at: Node | None = end
+    nodes: list[Node] = []
+    at: Node | None = end if end in before else None
     while at is not None:
-        if at[0] == "line":
-            return True
+        nodes.append(at)
         at = before[at]
-    return False
+    return nodes[::-1]

@@ -202,6 +202,8 @@ def _plot(feeder: Feeder, path: Path) -> None:
     from .show.feeder_plot import plot_feeder  # noqa: PLC0415
     from .show.figures import save_figure  # noqa: PLC0415
 
+    if path == Path():  # --plot without a file
+        path = Path(f"{feeder.name}.png")
     if path.suffix.lower() not in (".png", ".svg"):
         raise InputError.single("--plot", "", path.name, "must end in .png or .svg")
     figure = plot_feeder(feeder).get_figure()

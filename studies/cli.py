@@ -18,6 +18,7 @@ from .. import __version__
 VERBS = {
     "feeder": {
         "check": "every fault of a feeder file at once, or a summary of its sections",
+        "import": "a feeder file from an OpenDSS file, with a fidelity report",
         "solve": "one open phase: phasors before and after, and what each terminal says",
     },
     "study": {
@@ -125,6 +126,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     arguments = {
         "check": _check_arguments,
+        "import": _import_arguments,
         "solve": _solve_arguments,
         "size": _size_arguments,
         "assess": _assess_arguments,
@@ -149,9 +151,47 @@ def _verb_table() -> str:
 
 def _check_arguments(parser: argparse.ArgumentParser) -> None:
     _add_feeder(parser)
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the feeder into FILE")
+    parser.add_argument(
+        "--plot",
+        type=Path,
+        nargs="?",
+        const=Path(),
+        metavar="FILE",
+        help="draw the feeder into FILE (default: FEEDER's name with .png, in this folder)",
+    )
     _add_json(parser)
     parser.set_defaults(handler=_check)
+
+
+def _import_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, metavar="FILE", help="the .dss file of the circuit")
+    parser.add_argument(
+        "-o", dest="output", type=Path, metavar="feeder.toml", help="the feeder file to write"
+    )
+    csvs = {
+        "transformers": "connection by unit: unit,connection (unknown is one)",
+        "points": "existing reclosers: name,bus[,line]",
+        "peaks": "measured maxima and minima, or hourly amperes, at points",
+    }
+    for name, text in csvs.items():
+        parser.add_argument(f"--{name}", type=Path, metavar="CSV", help=text)
+    parser.add_argument(
+        "--drop",
+        action="append",
+        default=[],
+        metavar="ELEMENT",
+        help="leave an element out, as class.name (may be given several times)",
+    )
+    parser.add_argument(
+        "--reduce",
+        action="store_true",
+        help="fold laterals and low-voltage networks; the error is measured and printed",
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE", help="also write the report, .md or .json"
+    )
+    _add_json(parser)
+    parser.set_defaults(handler=_import)
 
 
 def _solve_arguments(parser: argparse.ArgumentParser) -> None:
@@ -248,7 +288,11 @@ def _paper_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_feeder(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("feeder", metavar="FEEDER", help="a feeder file, or a shipped name: paper")
+    parser.add_argument(
+        "feeder",
+        metavar="FEEDER",
+        help="a feeder file, a shipped name such as paper, or an OpenDSS file",
+    )
 
 
 def _add_json(parser: argparse.ArgumentParser) -> None:
@@ -270,6 +314,12 @@ def _check(args: argparse.Namespace) -> int:
     from .checking import check_command
 
     return check_command(args)
+
+
+def _import(args: argparse.Namespace) -> int:
+    from .importing import import_command
+
+    return import_command(args)
 
 
 def _solve(args: argparse.Namespace) -> int:

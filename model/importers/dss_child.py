@@ -20,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import InputError
+from ..errors import InputError, OpenPhaseError
 
 __all__ = ["run_apart", "serve"]
 
@@ -51,7 +51,9 @@ def run_apart(
     Raises
     ------
     InputError
-        If the function raises it, or the process dies or takes too long.
+        If the process dies or takes too long.
+    OpenPhaseError
+        If the function raises it.
     """
     environment = {k: v for k, v in os.environ.items() if not k.startswith("DSS_")}
     environment["PYTHONPATH"] = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
@@ -101,7 +103,7 @@ def _outcome(function: Callable[[Any], Any], argument: Any) -> tuple[str, Any]:
     """Return what came of the function, errors told apart."""
     try:
         return "done", function(argument)
-    except InputError as error:
+    except OpenPhaseError as error:
         return "refused", error
     except MemoryError:
         return "refused", InputError.single("", "the circuit", None, "needs too much memory")

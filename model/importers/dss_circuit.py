@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
-from .dss_engine import Engine, Props, rows_of
+from ..errors import Fault, InputError
+from .dss_engine import Engine, Props, count_of, rows_of
 from .dss_records import (
     End,
     Matrix,
@@ -27,6 +30,8 @@ from .dss_records import (
 )
 
 __all__ = ["read_circuit"]
+
+_T = TypeVar("_T")
 
 _METRES = {
     "mi": 1609.344,
@@ -58,26 +63,63 @@ _UNREAD = (
 def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) -> RawCircuit:
     """Return what the engine's circuit is made of, disabled elements left out."""
     solution = engine.circuit.Solution
-    return RawCircuit(
+    circuit = RawCircuit(
         name=str(engine.circuit.Name),
         frequency_hz=float(solution.Frequency),
         load_mult=float(solution.LoadMult),
-        sources=tuple(_source(row) for row in rows_of(engine, "vsource")),
+        sources=_each(engine, "vsource", _source),
         lines=_lines(engine),
-        transformers=tuple(_transformer(row) for row in rows_of(engine, "transformer")),
-        loads=tuple(_load(row) for row in rows_of(engine, "load")),
-        capacitors=tuple(_capacitor(row) for row in rows_of(engine, "capacitor")),
-        reactors=tuple(_reactor(engine, row) for row in rows_of(engine, "reactor")),
-        plants=tuple(_plant(kind, row) for kind in _PLANTS for row in rows_of(engine, kind)),
-        guards=tuple(_guard(kind, row) for kind in _GUARDS for row in rows_of(engine, kind)),
-        tap_controls=tuple(_tap_control(row) for row in rows_of(engine, "regcontrol")),
-        others=tuple(_other(kind, row) for kind in _UNREAD for row in rows_of(engine, kind)),
-        disabled=sum(
-            len(rows_of(engine, kind, disabled=True)) - len(rows_of(engine, kind))
-            for kind in ("line", "transformer", "load", "capacitor", "reactor", *_PLANTS)
+        transformers=_each(engine, "transformer", _transformer),
+        loads=_each(engine, "load", _load),
+        capacitors=_each(
+            engine, "capacitor", partial(_capacitor, frequency_hz=float(solution.Frequency))
         ),
+        reactors=_each(engine, "reactor", partial(_reactor, engine)),
+        plants=_each_of(engine, _PLANTS, _plant),
+        guards=_each_of(engine, _GUARDS, _guard),
+        tap_controls=_each(engine, "regcontrol", _tap_control),
+        cap_controls=_each(engine, "capcontrol", _name),
+        others=_each_of(engine, _UNREAD, _other),
+        disabled=0,
         coordinates=tuple((bus, x, y) for bus, (x, y) in coordinates.items()),
     )
+    enabled = {
+        "line": circuit.lines,
+        "transformer": circuit.transformers,
+        "load": circuit.loads,
+        "capacitor": circuit.capacitors,
+        "reactor": circuit.reactors,
+    }
+    counted = sum(count_of(engine, kind) - len(parts) for kind, parts in enabled.items())
+    return replace(circuit, disabled=counted)
+
+
+def _each(engine: Engine, kind: str, read: Callable[[Props], _T]) -> tuple[_T, ...]:
+    """Read every element of a class.
+
+    Raises
+    ------
+    InputError
+        With every element whose values make none: an infinite one is told as nothing.
+    """
+    found: list[_T] = []
+    faults: list[Fault] = []
+    for row in rows_of(engine, kind):
+        try:
+            found.append(read(row))
+        except (ArithmeticError, IndexError, TypeError, ValueError):
+            where, rule = f"{kind} {_name(row)!r}", "must hold finite numbers that make an element"
+            faults.append(Fault(source=engine.source, line=None, where=where, wanted=rule))
+    if faults:
+        raise InputError(faults)
+    return tuple(found)
+
+
+def _each_of(
+    engine: Engine, kinds: Sequence[str], read: Callable[[str, Props], _T]
+) -> tuple[_T, ...]:
+    """Read every element of several classes."""
+    return tuple(part for kind in kinds for part in _each(engine, kind, partial(read, kind)))
 
 
 def end_of(text: str, conductors: int, phases: int) -> End:
@@ -130,10 +172,10 @@ def _source(row: Props) -> RawSource:
 
 def _lines(engine: Engine) -> tuple[RawLine, ...]:
     units = {_name(row): row.get("units") for row in rows_of(engine, "linecode", disabled=True)}
-    return tuple(_line(engine, row, units) for row in rows_of(engine, "line"))
+    return _each(engine, "line", partial(_line, engine, units))
 
 
-def _line(engine: Engine, row: Props, code_units: dict[str, Any]) -> RawLine:
+def _line(engine: Engine, code_units: dict[str, Any], row: Props) -> RawLine:
     phases = int(row["phases"])
     code = row.get("linecode")
     unit = str(row["units"]).lower()
@@ -219,17 +261,21 @@ def _load(row: Props) -> RawLoad:
     )
 
 
-def _capacitor(row: Props) -> RawCapacitor:
+def _capacitor(row: Props, frequency_hz: float) -> RawCapacitor:
     phases = int(row["phases"])
     delta = str(row["conn"]).lower().startswith(("d", "l"))
+    kv = float(row["kv"])
+    branch_kv = kv / 3.0**0.5 if phases > 1 and not delta else kv
+    # microfarads are what counts: the engine makes them of kvar in its own way
+    kvar_of_uf = 2.0e-3 * math.pi * frequency_hz * branch_kv**2 * phases
     return RawCapacitor(
         name=_name(row),
         end=end_of(row["bus1"], phases, phases),
         far=end_of(row["bus2"] or "", phases, phases),
         phases=phases,
         delta=delta,
-        kv=float(row["kv"]),
-        kvar=tuple(float(value) for value in row["kvar"]),
+        kv=kv,
+        kvar=tuple(float(f"{kvar_of_uf * float(value):.12g}") for value in row["cuf"]),
         states=tuple(int(value) for value in row["states"]),
         damped=any(float(value) != 0.0 for key in ("r", "xl") for value in row[key]),
     )

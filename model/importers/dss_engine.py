@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,17 @@ import numpy as np
 from ..errors import Fault, InputError, OpenPhaseError
 from .dss_script import Command
 
-__all__ = ["Engine", "Props", "rows_of", "solved_volts", "start"]
+__all__ = [
+    "Engine",
+    "Props",
+    "count_of",
+    "refusals_told",
+    "rows_of",
+    "solved_volts",
+    "start",
+    "tell",
+    "version",
+]
 
 Props = Mapping[str, Any]
 
@@ -31,6 +42,7 @@ class Engine:
     context: Any
     circuit: Any
     source: str
+    refusal: type[Exception]  #: what it raises
 
 
 def start(commands: Iterable[Command], source: str) -> Engine:
@@ -57,8 +69,7 @@ def start(commands: Iterable[Command], source: str) -> Engine:
         try:
             context.Text.Command = command.text
         except dss.DSSException as error:
-            said = " ".join(str(error.args[-1]).split())[:300]
-            where, rule = command.text[:80], f"is not taken by OpenDSS: {said}"
+            where, rule = command.text[:80], f"is not taken by OpenDSS: {_said(error)}"
             faults.append(Fault(source=command.file, line=command.line, where=where, wanted=rule))
             if len(faults) >= _MOST_FAULTS:
                 break
@@ -68,7 +79,24 @@ def start(commands: Iterable[Command], source: str) -> Engine:
         )
     if faults:
         raise InputError(faults)
-    return Engine(context=context, circuit=context.ActiveCircuit, source=source)
+    return Engine(
+        context=context, circuit=context.ActiveCircuit, source=source, refusal=dss.DSSException
+    )
+
+
+@contextmanager
+def refusals_told(engine: Engine) -> Iterator[None]:
+    """Turn what the engine says against the circuit as a whole into an error of the input."""
+    try:
+        yield
+    except engine.refusal as error:
+        rule = f"is not taken by OpenDSS: {_said(error)}"
+        raise InputError.single(engine.source, "the circuit", None, rule) from None
+
+
+def _said(error: Exception) -> str:
+    """Return what the engine said, on one line."""
+    return " ".join(str(error.args[-1]).split())[:300]
 
 
 def rows_of(engine: Engine, kind: str, *, disabled: bool = False) -> list[Props]:
@@ -77,28 +105,46 @@ def rows_of(engine: Engine, kind: str, *, disabled: bool = False) -> list[Props]
         return []
     options = _FULL | _LOWER | (0 if disabled else _NO_DISABLED)
     text = engine.circuit.ActiveClass.ToJSON(options)
-    found = json.loads(text) if text else []
+    try:
+        found = json.loads(text) if text else []
+    except json.JSONDecodeError:
+        # so it comes where a list of them holds an infinite one
+        rule = "must hold finite numbers"
+        raise InputError.single(engine.source, f"every {kind}", None, rule) from None
     return found if isinstance(found, list) else []
 
 
-def solved_volts(
-    engine: Engine, *, mode: str, disabled: Iterable[str] = ()
-) -> tuple[dict[tuple[str, int], complex], bool]:
+def version(engine: Engine) -> str:
+    """Return the engine's name and version."""
+    return str(engine.context.Version).split(" revision", maxsplit=1)[0]
+
+
+def count_of(engine: Engine, kind: str) -> int:
+    """Return how many elements of a class there are, disabled ones too."""
+    engine.circuit.SetActiveClass(kind)
+    return int(engine.circuit.ActiveClass.Count)
+
+
+def tell(engine: Engine, commands: Iterable[str]) -> None:
+    """Hand commands over that were made here, not read from a file."""
+    for command in commands:
+        engine.context.Text.Command = command
+
+
+def solved_volts(engine: Engine, *, mode: str) -> tuple[dict[tuple[str, int], complex], bool]:
     """Let the engine solve, its controls off, and return each node's voltage to earth.
 
     Parameters
     ----------
     mode
         ``snap`` with the loads' own laws, ``direct`` with nominal admittances.
-    disabled
-        Elements that were left out of the import.
     """
-    text = engine.context.Text
-    for element in disabled:
-        text.Command = f'Disable "{element}"'
-    for option in ("controlmode=off", "tolerance=1e-9", "maxiterations=2000", f"mode={mode}"):
-        text.Command = f"Set {option}"
-    engine.circuit.Solution.Solve()
+    options = ("controlmode=off", "tolerance=1e-8", "maxiterations=500", f"mode={mode}")
+    tell(engine, (f"Set {option}" for option in options))
+    try:
+        engine.circuit.Solution.Solve()
+    except engine.refusal:
+        return {}, False
     flat = np.asarray(engine.circuit.AllBusVolts, np.float64)
     volts = flat[0::2] + 1j * flat[1::2]
     nodes: dict[tuple[str, int], complex] = {}

@@ -12,6 +12,7 @@ from ..buses import bus_volts
 from ..errors import Fault, InputError
 from ..feeder import make_feeder
 from ..parts import Coordinates, Feeder, InlineTransformer, Load, Place, Regulator, Source
+from .dss_apart import read_apart
 from .dss_choices import (
     CapacitorStates,
     Taps,
@@ -21,8 +22,6 @@ from .dss_choices import (
     with_taps,
     without,
 )
-from .dss_circuit import read_circuit
-from .dss_engine import Engine, start
 from .dss_lines import LineParts, line_parts
 from .dss_live import Node, live_nodes
 from .dss_loads import capacitor_of, der_of, loads_of
@@ -30,7 +29,7 @@ from .dss_names import Names, letters
 from .dss_neutrals import neutrals_of
 from .dss_records import RawCircuit, RawReactor
 from .dss_regulators import regulators_of, with_tap_changer
-from .dss_script import read_script
+from .dss_script import Script, read_script
 from .dss_spans import is_series, spans_of
 from .dss_transformers import Banks, inline_parts
 from .findings import Findings
@@ -45,8 +44,8 @@ class Imported:
     feeder: Feeder
     findings: Findings
     circuit: RawCircuit
-    engine: Engine
-    ignored: tuple[str, ...]  #: commands of the files that were left out
+    script: Script  #: what the files' circuit is made of, and what was left out of them
+    engine: str  #: name and version of the engine that read it
     dropped: tuple[str, ...]
     buses: Mapping[str, str]  #: the feeder's name of each bus of the file
     lines: Mapping[str, str]  #: and of each line
@@ -94,8 +93,7 @@ def import_opendss(
         If the extra is not installed.
     """
     script = read_script(path)
-    engine = start(script.commands, path.name)
-    circuit = read_circuit(engine, script.coordinates)
+    circuit, engine = read_apart(script, path.name)
     if taps is not None:
         circuit = with_taps(circuit, taps)
     if capacitor_states is not None:
@@ -110,8 +108,8 @@ def import_opendss(
         feeder=feeder,
         findings=findings,
         circuit=circuit,
+        script=script,
         engine=engine,
-        ignored=script.ignored,
         dropped=dropped,
         buses=dict(build.buses.given),
         lines=dict(build.built.names.given),
@@ -142,6 +140,10 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
         for plant in circuit.plants
         for part in der_of(plant, live, build.buses, names, findings)
     ]
+    for control in circuit.tap_controls:
+        findings.add("regcontrol", control.name, "state kept", "taps stay as the file has them")
+    for name in circuit.cap_controls:
+        findings.add("capcontrol", name, "state kept", "steps stay as the file has them")
     for other in circuit.others:
         findings.add(other.kind, other.name, "refused", "a class that has no model")
     shunts = _shunts(build)
@@ -261,6 +263,7 @@ def _add_series(build: _Build) -> None:
             if regulator is not None:
                 name = regulator_names.new(regulator.name)
                 build.regulators.append(replace(regulator, name=name))
+    spans += banks.spans
     kept = [span for span in spans if span.name not in regulated.jumpers]
     build.built = line_parts(kept, circuit.guards, build.buses, findings)
 

@@ -116,10 +116,11 @@ class Folder:
             handle = os.open(file.path, flags)
         except OSError as error:
             raise NotReadError(f"cannot be read: {error.strerror}") from None
+        status = os.fstat(handle)
+        if not stat.S_ISREG(status.st_mode):
+            os.close(handle)
+            raise NotReadError("is no ordinary file")
         with os.fdopen(handle, "rb") as stream:
-            status = os.fstat(stream.fileno())
-            if not stat.S_ISREG(status.st_mode):
-                raise NotReadError("is no ordinary file")
             if status.st_size > self.max_file_bytes:
                 raise NotReadError(f"is larger than {self.max_file_bytes:,} bytes")
             data = stream.read(self.max_file_bytes)

@@ -85,7 +85,7 @@ def _put_guards(
         findings.add(guard.kind, guard.name, "as it is", "a switch, closed")
 
 
-def _put_switch(  # noqa: PLR0913
+def _put_switch(  # noqa: PLR0913 - what it puts, and where all is kept
     span: Span,
     ends: list[str],
     terminal: int,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 
 from .dss_coils import coils_of
-from .dss_records import RawCircuit, RawLoad
+from .dss_records import End, RawCircuit, RawLoad
 
 __all__ = ["Node", "element_names", "fed_kw", "live_nodes", "load_kw"]
 
@@ -59,33 +59,32 @@ def fed_kw(circuit: RawCircuit, without: Collection[str] = ()) -> float:
 
 def element_names(circuit: RawCircuit) -> set[str]:
     """Return every element that may be dropped, as ``class.name``."""
-    tables = {
-        "vsource": circuit.sources,
-        "line": circuit.lines,
-        "transformer": circuit.transformers,
-        "load": circuit.loads,
-        "capacitor": circuit.capacitors,
-        "reactor": circuit.reactors,
+    names = {
+        "vsource": [part.name for part in circuit.sources],
+        "line": [part.name for part in circuit.lines],
+        "transformer": [part.name for part in circuit.transformers],
+        "load": [part.name for part in circuit.loads],
+        "capacitor": [part.name for part in circuit.capacitors],
+        "reactor": [part.name for part in circuit.reactors],
     }
-    named = {f"{kind}.{part.name}" for kind, parts in tables.items() for part in parts}
-    kinded = (*circuit.plants, *circuit.guards, *circuit.others)
-    return named | {f"{part.kind}.{part.name}" for part in kinded}
+    named = {f"{kind}.{name}" for kind, found in names.items() for name in found}
+    named |= {f"{part.kind}.{part.name}" for part in circuit.plants}
+    named |= {f"{part.kind}.{part.name}" for part in circuit.guards}
+    return named | {f"{part.kind}.{part.name}" for part in circuit.others}
 
 
 def _joins(circuit: RawCircuit) -> Iterator[_Pair]:
     """Return the pairs of phase nodes that elements join, each with its element."""
     for line in circuit.lines:
-        element = f"line.{line.name}"
-        start, end = line.ends
-        opened = zip(*line.opened, strict=True)
-        for near, far, broken in zip(start.nodes, end.nodes, opened, strict=True):
-            if near > 0 and far > 0 and not any(broken):
-                yield element, (start.bus, near), (end.bus, far)
+        opened = [any(broken) for broken in zip(*line.opened, strict=True)]
+        yield from _through(f"line.{line.name}", line.ends, opened)
     for reactor in circuit.reactors:
-        start, end = reactor.ends
-        for near, far in zip(start.nodes, end.nodes, strict=True):
-            if near > 0 and far > 0:
-                yield f"reactor.{reactor.name}", (start.bus, near), (end.bus, far)
+        yield from _through(f"reactor.{reactor.name}", reactor.ends)
+    for bank in circuit.capacitors:
+        yield from _through(f"capacitor.{bank.name}", (bank.end, bank.far))
+    for other in circuit.others:
+        for far in other.ends[1:]:
+            yield from _through(f"{other.kind}.{other.name}", (other.ends[0], far))
     for unit in circuit.transformers:
         for coils in coils_of(unit):
             nodes = [
@@ -96,16 +95,15 @@ def _joins(circuit: RawCircuit) -> Iterator[_Pair]:
             ]
             for node in nodes[1:]:
                 yield f"transformer.{unit.name}", nodes[0], node
-    for bank in circuit.capacitors:
-        for near, far in zip(bank.end.nodes, bank.far.nodes, strict=True):
-            if near > 0 and far > 0 and bank.far.bus not in ("", bank.end.bus):
-                yield f"capacitor.{bank.name}", (bank.end.bus, near), (bank.far.bus, far)
-    for other in circuit.others:
-        for far_end in other.ends[1:]:
-            for near, far in zip(other.ends[0].nodes, far_end.nodes, strict=False):
-                if near > 0 and far > 0:
-                    yield (
-                        f"{other.kind}.{other.name}",
-                        (other.ends[0].bus, near),
-                        (far_end.bus, far),
-                    )
+
+
+def _through(
+    element: str, ends: tuple[End, End], opened: Sequence[bool] | None = None
+) -> Iterator[_Pair]:
+    """Return what a series element joins, conductor by conductor, but for the open ones."""
+    near, far = ends
+    if far.bus in ("", near.bus):
+        return
+    for n, (start, end) in enumerate(zip(near.nodes, far.nodes, strict=False)):
+        if start > 0 and end > 0 and not (opened and opened[n]):
+            yield element, (near.bus, start), (far.bus, end)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 from ..parts import Capacitor, Der, Load, LoadConnection, Place
 from .dss_live import Node, load_kw
@@ -14,8 +14,6 @@ from .findings import Findings
 __all__ = ["capacitor_of", "der_of", "law_of", "loads_of"]
 
 _Branch = tuple[int, int]
-
-_EDGE = "edge_exponent" in {field.name for field in fields(Load)}
 
 
 def law_of(raw: RawLoad) -> tuple[Load, str]:
@@ -53,8 +51,9 @@ def law_of(raw: RawLoad) -> tuple[Load, str]:
             how = "its cut-off voltage is left out"
         z, i, s, zq, iq, sq = shares[:6]
         law = replace(law, zip=(z, i, s, zq, iq, sq))
-    if raw.model in (3, 4) and _EDGE:
-        law = replace(law, **{"edge_exponent": 0.0})  # type: ignore[arg-type]
+    if raw.model in (3, 4):
+        # beyond their range they go on as constant power, whatever their law is within
+        law = replace(law, edge_exponent=0.0)
     return law, how
 
 

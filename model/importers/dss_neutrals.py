@@ -41,7 +41,7 @@ def neutrals_of(circuit: RawCircuit) -> Neutrals:
         conductors=frozenset(
             (end.bus, node) for line in circuit.lines for end in line.ends for node in end.nodes
         ),
-        shared=frozenset(node for node, count in uses.items() if count > 1),
+        shared=frozenset(node for node, count in uses.items() if count > 1 and node[1] > 3),
         reactors=frozenset(reactors),
     )
 

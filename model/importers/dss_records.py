@@ -198,6 +198,7 @@ class RawCircuit:
     plants: tuple[RawPlant, ...]
     guards: tuple[RawGuard, ...]
     tap_controls: tuple[RawTapControl, ...]
+    cap_controls: tuple[str, ...]  #: names alone
     others: tuple[OtherElement, ...]
     disabled: int
     coordinates: tuple[tuple[str, float, float], ...] = ()

@@ -151,8 +151,8 @@ def _arrangement(coils: Sequence[Coil]) -> tuple[Reference, set[int]] | None:
     if 0 in nodes or len({frozenset(coil) for coil in coils}) < len(coils):
         return None
     if len(coils) == 3:
-        around = all(q == p % 3 + 1 for p, q in coils) or all(p == q % 3 + 1 for p, q in coils)
-        return ("next", nodes) if around else None
+        # three units of two windings are no closed delta of autotransformers
+        return None
     common = set(coils[0]).intersection(*coils[1:])
     if len(coils) == 1:
         common = {coils[0][1]}
@@ -164,9 +164,6 @@ def _arrangement(coils: Sequence[Coil]) -> tuple[Reference, set[int]] | None:
 
 def _own(coil: Coil, reference: Reference) -> int:
     """Return the phase whose tap a coil's is."""
-    if reference == "next":
-        p, q = coil
-        return p if q == p % 3 + 1 else q
     other = 0 if reference == "earth" else "abc".index(reference) + 1
     return coil[0] if coil[1] == other else coil[1]
 

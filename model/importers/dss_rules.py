@@ -95,8 +95,8 @@ OPTIONS_REFUSED: dict[str, str] = dict.fromkeys(
 }
 
 LARGEST: dict[str, int] = {
-    "phases": 30,
-    "nphases": 30,
+    "phases": 12,
+    "nphases": 12,
     "nconds": 60,
     "cond": 60,
     "windings": 20,

@@ -16,7 +16,8 @@ from pathlib import Path
 from ..errors import InputError
 from .dss_folder import Folder, NotReadError, TextFile
 from .dss_notes import Place
-from .dss_obey import Command, State, obey
+from .dss_obey import obey
+from .dss_state import Command, State
 
 __all__ = ["Command", "Script", "read_script"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .dss_live import Node
 from .dss_records import Matrix, RawCircuit, RawLine, RawReactor
-from .findings import Findings
+from .findings import Fate, Findings
 
 __all__ = ["Span", "is_series", "merged", "spans_of"]
 
@@ -145,7 +145,7 @@ def _ends_open(line: RawLine, kept: Sequence[int]) -> int | None:
 
 def _fate(
     line: RawLine, kept: Sequence[int], fed: Sequence[int], neutral: Sequence[int]
-) -> tuple[str, str]:
+) -> tuple[Fate, str]:
     """Say what became of a line that is there."""
     how = []
     if neutral and any(node > 3 for end in line.ends for node in end.nodes):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from functools import lru_cache
@@ -9,7 +10,7 @@ from functools import lru_cache
 from .dss_notes import Notes, Place
 from .dss_rules import LARGEST, PROPERTIES_LEFT_OUT, PROPERTIES_REFUSED
 from .dss_tokens import Parameter, quoted
-from .dss_words import PROPERTIES, find_word
+from .dss_words import PROPERTIES, find_word, word_list
 
 __all__ = ["MAX_VALUE_CHARS", "property_texts", "safe_value"]
 
@@ -20,6 +21,15 @@ _MAX_NODE = 99
 _NAMED = re.compile(r"file\s*=", re.IGNORECASE)
 _WHOLE = re.compile(r"[+-]?\d{1,12}(\.0*)?")
 _BUS_PROPERTIES = {"bus", "bus1", "bus2", "buses", "vbus"}
+_NAME_PROPERTIES = _BUS_PROPERTIES | set(
+    word_list(
+        """linecode geometry spacing wire wires cncable cncables tscable tscables like
+        transformer xfmrcode bank subname element capacitor monitoredobj switchedobj"""
+    )
+)
+_NUMBER_BEYOND = re.compile(
+    r"[+-]?(?:inf|infinity|nan|(?:\d+\.?\d*|\.\d+)e\+?\d{3,})", re.IGNORECASE
+)
 _BUS_NODES = re.compile(r"(?<=\.)[^.\s,]+")
 
 
@@ -83,6 +93,8 @@ def safe_value(notes: Notes, place: Place, where: str, parameter: Parameter) -> 
         wanted = "must not hold '='"
     elif name in LARGEST and not _is_whole(value, LARGEST[name]):
         wanted = f"must be a whole number from 0 to {LARGEST[name]:,}"
+    elif name not in _NAME_PROPERTIES and not _are_finite(value):
+        wanted = "must be finite"
     elif name in _BUS_PROPERTIES and not _are_buses(value):
         wanted = f"must name at most {_MAX_NODES} nodes from 0 to {_MAX_NODE}"
     text = quoted(value, parameter.opening)
@@ -104,6 +116,14 @@ def _is_whole(value: str, largest: int) -> bool:
     """Return whether a value is a whole number from 0 to the largest."""
     text = value.strip()
     return bool(_WHOLE.fullmatch(text)) and 0 <= int(float(text)) <= largest
+
+
+def _are_finite(value: str) -> bool:
+    """Return whether no number in a value is infinite or none at all."""
+    return not any(
+        _NUMBER_BEYOND.fullmatch(word) and not math.isfinite(float(word))
+        for word in re.split(r"[\s,|]+", value)
+    )
 
 
 def _are_buses(value: str) -> bool:

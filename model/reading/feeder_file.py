@@ -29,6 +29,9 @@ __all__ = [
 
 _DATA = resources.files(__name__.removesuffix(".reading.feeder_file")) / "data"
 
+OPENDSS_SUFFIXES = (".dss", ".txt")
+"""Files of these are imported."""
+
 
 def read_feeder(path: Path) -> Feeder:
     """Return the feeder that a file describes.
@@ -64,6 +67,8 @@ def feeder_from_toml(text: str, source_name: str, folder: Path | None = None) ->
 def load_feeder(name_or_path: str) -> Feeder:
     """Return a shipped feeder by its name, or else the feeder in the file of that path.
 
+    A file of OpenDSS's is imported; that needs the extra ``opendss``.
+
     Raises
     ------
     InputError
@@ -79,6 +84,11 @@ def load_feeder(name_or_path: str) -> Feeder:
         file_name = f"{name_or_path}.toml"
         return feeder_from_toml((_DATA / file_name).read_text(encoding="utf-8"), file_name)
     path = Path(name_or_path)
+    if path.exists() and path.suffix.lower() in OPENDSS_SUFFIXES:
+        # the importer needs this package whole, and an extra besides
+        from ..importers.dss_feeder import import_opendss  # noqa: PLC0415
+
+        return import_opendss(path).feeder
     if path.exists():
         return read_feeder(path)
     rule = (

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from ..buses import bus_phases, bus_volts, fed_backwards, to_side_volts
 from ..errors import KeyPath, Report
-from ..parts import Capacitor, Der, Feeder, Line, Load, Place, Transformer
+from ..parts import Capacitor, Der, Feeder, Line, Load, Place, Regulator, Switch, Transformer
 from ..phases import conductors, letters, phase_mask
 
 __all__ = ["check_phases", "check_volts"]
@@ -61,29 +61,27 @@ _ORDERS = ("abc", "acb", "bac", "bca", "cab", "cba")
 
 def _check_joining(feeder: Feeder, there: Mapping[str, int], report: Report) -> None:
     """What joins two buses has no phase that neither of them has."""
-    own: list[tuple[KeyPath, str, str]] = []
-    own += [(("lines", n), part.from_bus, part.phases) for n, part in enumerate(feeder.lines)]
-    own += [(("switches", n), part.from_bus, part.phases) for n, part in enumerate(feeder.switches)]
-    own += [
-        (("regulators", n), part.from_bus, conductors(part))
-        for n, part in enumerate(feeder.regulators)
-    ]
-    for path, bus, phases in own:
-        if bus in there:
-            _require((*path, "phases"), phases, there[bus], report)
+    joining: dict[str, Sequence[Line | Switch | Regulator]] = {
+        "lines": feeder.lines,
+        "switches": feeder.switches,
+        "regulators": feeder.regulators,
+    }
+    for table, parts in joining.items():
+        for n, part in enumerate(parts):
+            phases = conductors(part) if isinstance(part, Regulator) else part.phases
+            # a bus that no phase reaches at all is the fault of what leads there
+            bus = part.from_bus if part.from_bus in there else part.to_bus
+            _require((table, n, "phases"), phases, there.get(bus, _ALL), report)
     for n, unit in enumerate(feeder.inline_transformers):
-        if unit.from_bus in there and unit.to_bus in there:
-            path = ("inline_transformers", n)
-            _require((*path, "phases"), unit.phases, there[unit.from_bus], report)
-            _require((*path, "to_phases"), unit.to_phases, there[unit.to_bus], report)
+        path = ("inline_transformers", n)
+        _require((*path, "phases"), unit.phases, there.get(unit.from_bus, _ALL), report)
+        _require((*path, "to_phases"), unit.to_phases, there.get(unit.to_bus, _ALL), report)
 
 
 def _require(path: KeyPath, wanted: str, there: int, report: Report) -> None:
     """Report phases that are not there."""
     if phase_mask(wanted) & ~there:
-        rule = (
-            f"must be among the phases that the source reaches there with, {_named(letters(there))}"
-        )
+        rule = f"must be among those that the source reaches there ({_named(letters(there))})"
         report.add(path, rule, repr(wanted))
 
 

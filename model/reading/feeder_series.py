@@ -36,8 +36,8 @@ def _check_code(code: LineCode, index: int, own: OwnChecks) -> None:
             rule = f"must have as many rows as r_ohm_per_km ({size})"
             own.add(("codes", index, key), beside, rule, f"{len(matrix)}")
             return
-    if abs(_determinant(code)) < _SINGULAR:
-        rule = "must leave an impedance in every loop of its conductors: the matrix is singular"
+    if not _drives(code):
+        rule = "must leave an impedance in every loop of its conductors: R + jX is singular"
         own.add(("codes", index, "x_ohm_per_km"), beside, rule, as_toml(code.x_ohm_per_km))
 
 
@@ -45,19 +45,23 @@ _SINGULAR = 1e-9
 """Least determinant of a code's impedances with each row scaled to a diagonal of 1."""
 
 
-def _determinant(code: LineCode) -> complex:
-    """Determinant of R + jX, its rows and columns scaled to a diagonal of 1."""
+def _drives(code: LineCode) -> bool:
+    """Whether every current through the conductors needs a voltage."""
     size = range(len(code.r_ohm_per_km))
     z = [[complex(code.r_ohm_per_km[i][j], code.x_ohm_per_km[i][j]) for j in size] for i in size]
-    if any(z[i][i] == 0 for i in size):
-        return 0j
+    if any(z[i][i] == 0.0 for i in size):
+        return False
     scaled = [[z[i][j] / (z[i][i] * z[j][j]) ** 0.5 for j in size] for i in size]
-    if len(scaled) == 1:
-        return scaled[0][0]
-    if len(scaled) == 2:
-        return scaled[0][0] * scaled[1][1] - scaled[0][1] * scaled[1][0]
-    (a, b, c), (d, e, f), (g, h, i) = scaled
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return abs(_determinant(scaled)) > _SINGULAR
+
+
+def _determinant(matrix: list[list[complex]]) -> complex:
+    """Determinant by its first row, which will do for three."""
+    if len(matrix) == 1:
+        return matrix[0][0]
+    minors = ([row[:j] + row[j + 1 :] for row in matrix[1:]] for j in range(len(matrix)))
+    terms = (own * _determinant(minor) for own, minor in zip(matrix[0], minors, strict=True))
+    return sum((-term if j % 2 else term for j, term in enumerate(terms)), start=0j)
 
 
 def _check_build(line: Line, index: int, codes: Mapping[str, LineCode], own: OwnChecks) -> None:

@@ -138,7 +138,7 @@ _KIND_WORDS: dict[Kind, str] = {
     "numbers": "a list of finite numbers",
     "integers": "a list of integers",
     "matrix": "a symmetric matrix, [[...], ...] of 1 to 3 rows",
-    "phases": "phases, one to three of the letters a, b, c",
+    "phases": "one to three of the letters a, b, c",
     "table": "a table",
     "tables": "an array of tables",
     "distribution": "a number, [low, high] or a distribution",

@@ -73,6 +73,7 @@ def _concerns(table: str, field: str, row: _Row) -> bool:
 
 
 _CONCERNS: dict[tuple[str, str], Callable[[_Row], bool]] = {
+    ("source", "angle_deg"): lambda row: bool(row["angle_deg"]),  # where angles begin is no guess
     ("loads", "connection"): lambda row: row["transformer"] is None,
     ("loads", "phases"): lambda row: row["transformer"] is None,
     ("loads", "branch_kv"): lambda row: row["transformer"] is None,

@@ -141,7 +141,7 @@ INLINE_TRANSFORMERS: tuple[Field, ...] = (
         unit="pu",
         high=1.0,
         required=True,
-        doc="Leakage, not 0; of `centre-tap` the from-winding's branch of the star, which may be 0.",
+        doc="Leakage, not 0; of `centre-tap` the from-winding's branch of the star, maybe 0.",
     ),
     Field(
         name="leg_leakage_pu",
@@ -216,7 +216,7 @@ REGULATORS: tuple[Field, ...] = (
         kind="integers",
         count=3,
         default=(0, 0, 0),
-        doc="Tap positions of phases a, b, c; `to` has 1 + tap x `step_pct` / 100 of `from`.",
+        doc="Tap positions of phases a, b, c; each adds tap x `step_pct` of its voltage at `from`.",
     ),
     Field(
         name="step_pct",

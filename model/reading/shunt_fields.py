@@ -145,7 +145,7 @@ LOADS: tuple[Field, ...] = (
         above=0.0,
         high=2.0,
         default=0.7,
-        doc="Below it each branch is a constant impedance, its last one.",
+        doc="Below it each branch is a constant impedance, that at the limit.",
     ),
     Field(
         name="v_max_pu",
@@ -160,9 +160,16 @@ LOADS: tuple[Field, ...] = (
         name="v_low_pu",
         kind="number",
         unit="pu",
-        low=0.0,
+        above=0.0,
         high=2.0,
-        doc="Down to it from `v_min_pu` the impedance goes back to the nominal one, linearly.",
+        doc="Down to it the current goes linearly from the limit to the nominal impedance's.",
+    ),
+    Field(
+        name="edge_exponent",
+        kind="number",
+        low=0.0,
+        high=10.0,
+        doc="At both limits the load is what this exponent makes it, and not its own law.",
     ),
     Field(
         name="motor_share",

@@ -10,6 +10,7 @@ import re
 import tomllib
 from bisect import bisect_right
 from collections.abc import Iterator
+from functools import cache
 
 from ..errors import KeyPath, Locator
 
@@ -176,11 +177,13 @@ def line_numbers(text: str) -> dict[KeyPath, int]:
 def locator(text: str) -> Locator:
     """Return a function that gives the line of a key path, or of the table it belongs to.
 
-    A key that is missing is located where its table begins.
+    A key that is missing is located where its table begins. The text is gone through at the first
+    fault, since most have none.
     """
-    known = line_numbers(text)
+    lines = cache(line_numbers)
 
     def locate(path: KeyPath) -> int | None:
+        known = lines(text)
         prefixes = (path[:end] for end in range(len(path), 0, -1))
         return next((known[prefix] for prefix in prefixes if prefix in known), None)
 

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .primitives import branches_of
+from ..phases import phase_rows
 
 __all__ = [
     "Equivalent",
@@ -26,6 +26,7 @@ __all__ = [
     "SeenLoad",
     "across",
     "equivalent_of",
+    "gain_through",
     "seen_through",
 ]
 
@@ -34,6 +35,9 @@ Kind = Literal["bus", "line", "units", "both"]
 
 LEAST_Z = 1e-6
 """Least impedance of an equivalent, as a share of that of its loads."""
+
+UNITS_SHARE = 0.1
+"""Of the impedance on the way, where a line and units share it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,15 +53,30 @@ class Fit:
 class Equivalent:
     """Loads at the root ("bus"), or beyond a line, single-phase units, or first one then the other.
 
-    ``z_ohm`` is that of all on the way.
+    Units stand on one phase each and lead to the same phase, or where all loads are between
+    phases (``paired``) on ab, bc, ca, and lead to a, b, c.
     """
 
     kind: Kind
-    z_ohm: Complex  #: (3, 3) between the root and the loads; 0 for "bus"
-    near_s: Complex  #: (3, 3) to earth at the root
-    far_s: Complex  #: (3, 3) to earth at the loads
+    paired: bool
+    line_z_ohm: Complex  #: (3, 3)
+    half_s: Complex  #: (3, 3) charging at either end of the line
+    unit_z_ohm: Complex  #: (3,) leakage of each unit; 0: there is none
+    unit_y_s: Complex  #: (3,) magnetizing admittance
     fits: tuple[Fit, ...]
-    stub_gain: Complex  #: (3, 3) voltage at the loads per voltage at the root, at the fold's level
+
+    @property
+    def z_ohm(self) -> Complex:
+        """(3, 3) between the root and the loads."""
+        turns = np.linalg.pinv(_turns(self.paired, self.unit_z_ohm != 0.0))
+        units = turns @ np.diag(self.unit_z_ohm[self.unit_z_ohm != 0.0]) @ turns.T
+        return np.asarray(self.line_z_ohm + units, np.complex128)
+
+    @property
+    def far_s(self) -> Complex:
+        """(3, 3) what there is at the loads besides them."""
+        turns = _turns(self.paired, np.ones(3, np.bool_))
+        return np.asarray(self.half_s + turns.T @ np.diag(self.unit_y_s) @ turns, np.complex128)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,28 +104,45 @@ def equivalent_of(
     """
     if kind == "bus":
         return _at_the_root(level, whole_s, loads)
-    near, far = _shunts(kind, bare_s)
     fits = tuple(_fit(load.bare_gain) for load in loads)
-    b = _loaded(level, fits, loads) + far
+    paired = kind in ("units", "both") and all(fit.connection == "delta" for fit in fits)
+    half = np.zeros((3, 3), np.complex128)
+    if kind != "units":
+        half = np.asarray(0.5j * _capacitive(bare_s), np.complex128)
+    bare = Equivalent(
+        kind=kind,
+        paired=paired,
+        line_z_ohm=np.zeros((3, 3), np.complex128),
+        half_s=half,
+        unit_z_ohm=np.zeros(3, np.complex128),
+        unit_y_s=np.zeros(3, np.complex128) if kind == "line" else _iron(bare_s - 2 * half, paired),
+        fits=fits,
+    )
     size = _loaded(level, fits, loads, np.abs)
-    z = _passive(_series(kind, whole_s - near, b, size), size)
-    gain = np.asarray(np.linalg.inv(np.eye(3) + z @ b), np.complex128)
-    return Equivalent(kind=kind, z_ohm=z, near_s=near, far_s=far, fits=fits, stub_gain=gain)
+    basis = _basis(size)
+    z = _series(basis, whole_s - half, _loaded(level, fits, loads) + bare.far_s)
+    if kind == "line":
+        return replace(bare, line_z_ohm=_of_line(basis, z, size))
+    unit_z = _of_units(basis, z, size, paired)
+    if kind == "units":
+        return replace(bare, unit_z_ohm=unit_z)
+    shared = replace(bare, unit_z_ohm=UNITS_SHARE * unit_z)
+    return replace(shared, line_z_ohm=_of_line(basis, z, size) - shared.z_ohm)
 
 
 def _at_the_root(level: float, whole_s: Complex, loads: Sequence[SeenLoad]) -> Equivalent:
     """Every load by its effect at the level of the fold, and a factor for the total."""
-    nothing = np.zeros((3, 3), np.complex128)
     fits = [_fit(load.gain) for load in loads]
     b = _loaded(level, fits, loads)
-    factor = _projection(whole_s, b) if loads else 1.0
+    factor = _projection(whole_s, b) if b.any() else 1.0
     return Equivalent(
         kind="bus",
-        z_ohm=nothing,
-        near_s=nothing,
-        far_s=nothing,
+        paired=False,
+        line_z_ohm=np.zeros((3, 3), np.complex128),
+        half_s=np.zeros((3, 3), np.complex128),
+        unit_z_ohm=np.zeros(3, np.complex128),
+        unit_y_s=np.zeros(3, np.complex128),
         fits=tuple(replace(fit, share=fit.share * factor) for fit in fits),
-        stub_gain=np.eye(3, dtype=np.complex128),
     )
 
 
@@ -114,19 +150,26 @@ def seen_through(equivalent: Equivalent, level: float, loads: Sequence[SeenLoad]
     """(3, 3) what a root sees of its equivalent with linear loads, all at ``level``."""
     b = _loaded(level, equivalent.fits, loads) + equivalent.far_s
     inverse = np.linalg.inv(np.eye(3) + b @ equivalent.z_ohm)
-    return np.asarray(equivalent.near_s + inverse @ b)
+    return np.asarray(equivalent.half_s + inverse @ b)
 
 
-def _shunts(kind: Kind, bare: Complex) -> tuple[Complex, Complex]:
-    """What is there without loads: half of the charging at either end, magnetizing beyond."""
-    half = np.zeros((3, 3), np.complex128)
-    if kind in ("line", "both"):
-        half = np.asarray(0.5j * _capacitive(bare), np.complex128)
-    if kind == "line":
-        return half, half
-    left = (bare - 2.0 * half).diagonal()
-    iron = np.maximum(left.real, 0.0) + 1j * np.minimum(left.imag, 0.0)
-    return half, half + _diagonal_of(iron)
+def gain_through(equivalent: Equivalent, level: float, loads: Sequence[SeenLoad]) -> Complex:
+    """(3, 3) voltage before the loads, in the phases of the root, per voltage of the root."""
+    b = _loaded(level, equivalent.fits, loads) + equivalent.far_s
+    return np.asarray(np.linalg.inv(np.eye(3) + equivalent.z_ohm @ b), np.complex128)
+
+
+def _turns(paired: bool, there: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(units, 3) voltage across each unit per voltage of the root's phases."""
+    return across("abc", "delta" if paired else "wye")[there]
+
+
+def _iron(bare: Complex, paired: bool) -> Complex:
+    """(3,) what the units take without load: losses, and no capacitance."""
+    y = bare.diagonal()
+    if paired:
+        y = -np.array([bare[0, 1], bare[1, 2], bare[2, 0]])
+    return np.maximum(y.real, 0.0) + 1j * np.minimum(y.imag, 0.0)
 
 
 def _capacitive(bare: Complex) -> NDArray[np.float64]:
@@ -154,14 +197,10 @@ def _unit_shapes() -> list[tuple[str, Literal["wye", "delta"], Complex]]:
 @cache
 def across(phases: str, connection: str) -> NDArray[np.float64]:
     """(branches, 3) voltage of each branch per voltage of the phases."""
-    rows = np.zeros((0, 3))
-    for start, end in branches_of(phases, connection):
-        branch = np.zeros(3)
-        branch[start] = 1.0
-        if end >= 0:
-            branch[end] = -1.0
-        rows = np.vstack([rows, branch])
-    return rows
+    own = np.eye(3)[phase_rows(phases)]
+    if connection == "wye":
+        return own
+    return (own - np.roll(own, -1, axis=0))[: 3 if len(own) > 2 else 1]
 
 
 SHAPES = _unit_shapes()
@@ -201,39 +240,47 @@ def _loaded(
 _SHAPE = {(phases, connection): shape for phases, connection, shape in SHAPES}
 
 
-def _series(kind: Kind, whole: Complex, beyond: Complex, loads: Complex) -> Complex:
-    """(3, 3) the impedance before ``beyond`` that makes it look like ``whole``, where loads are."""
-    there = np.abs(loads).sum(axis=1) > 0.0
+def _basis(loads: Complex) -> NDArray[np.float64]:
+    """(3, n) the modes of the phases in which there are loads."""
     _, sizes, vectors = np.linalg.svd(loads.real)
-    basis = vectors[sizes > 1e-6 * sizes.max(initial=0.0)].T
+    return np.asarray(vectors[sizes > 1e-6 * sizes.max(initial=0.0)].T)
+
+
+def _series(basis: NDArray[np.float64], whole: Complex, beyond: Complex) -> Complex:
+    """(n, n) the impedance before ``beyond`` that makes it look like ``whole``, in these modes."""
     z = np.linalg.inv(basis.T @ whole @ basis) - np.linalg.inv(basis.T @ beyond @ basis)
-    z = (z + z.T) / 2.0
-    if kind == "units":
-        return _diagonal(z, basis, there)
-    full = basis @ z @ basis.T
+    return np.asarray((z + z.T) / 2.0)
+
+
+def _of_line(basis: NDArray[np.float64], z: Complex, loads: Complex) -> Complex:
+    """(3, 3) of a line with ``z`` in the modes that matter.
+
+    Where it is next to nothing, rounding may leave what no line can have: then the least.
+    """
+    there = np.abs(loads).sum(axis=1) > 0.0
     rest = np.diag(there.astype(float)) - basis @ basis.T
-    return np.asarray(full + np.trace(z) / len(z) * rest)
+    whole = basis @ z @ basis.T + np.trace(z) / len(z) * rest
+    own = whole.diagonal()
+    if np.all(~there | ((own.real >= 0.0) & (own.imag > 0.0))):
+        return np.asarray(whole)
+    return np.asarray(np.diag(np.where(there, _passive(own, loads), 0.0)), np.complex128)
+
+
+def _of_units(basis: NDArray[np.float64], z: Complex, loads: Complex, paired: bool) -> Complex:
+    """(3,) leakages that come nearest to ``z`` in these modes."""
+    turns = across("abc", "delta" if paired else "wye")
+    there = np.abs(turns @ loads).max(axis=1) > 0.0
+    if paired:
+        there = -np.array([loads[0, 1], loads[1, 2], loads[2, 0]]).real > 0.0
+    through = basis.T @ np.linalg.pinv(turns[there])
+    columns = np.array([np.outer(each, each).ravel() for each in through.T]).T
+    values, *_ = np.linalg.lstsq(columns.astype(np.complex128), z.ravel(), rcond=None)
+    found = np.zeros(3, np.complex128)
+    found[there] = _passive(np.asarray(values, np.complex128), loads)
+    return found
 
 
 def _passive(z: Complex, loads: Complex) -> Complex:
-    """The impedance, or one that a line can have: where it is next to nothing, rounding rules."""
-    own = z.diagonal()
-    there = np.abs(loads).sum(axis=1) > 0.0
-    if np.all(~there | ((own.real >= 0.0) & (own.imag > 0.0))):
-        return z
-    least = LEAST_Z / np.abs(loads).max()
-    values = np.maximum(own.real, 0.0) + 1j * np.maximum(own.imag, least)
-    return _diagonal_of(np.where(there, values, 0.0))
-
-
-def _diagonal(z: Complex, basis: NDArray[np.float64], there: NDArray[np.bool_]) -> Complex:
-    """Impedances of the phases alone that come nearest to ``z`` in the directions of ``basis``."""
-    columns = np.array([np.outer(row, row).ravel() for row in basis[there]]).T
-    values, *_ = np.linalg.lstsq(columns.astype(np.complex128), z.ravel(), rcond=None)
-    found = np.zeros(3, np.complex128)
-    found[there] = values
-    return _diagonal_of(found)
-
-
-def _diagonal_of(values: Complex) -> Complex:
-    return np.asarray(np.diag(values), np.complex128)
+    """No negative resistance, and some reactance."""
+    least = LEAST_Z / float(np.abs(loads).max())
+    return np.maximum(z.real, 0.0) + 1j * np.maximum(z.imag, least)

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from ..buses import bus_volts
 from ..parts import Feeder, InlineTransformer, Line, Load
-from .equivalent import Equivalent, Kind, SeenLoad, equivalent_of, seen_through
+from ..solver.assemble import law_factors
+from .choose import ENDS, Choice, SeenRoot, best_equivalent
+from .equivalent import Equivalent, Kind, SeenLoad, gain_through
 from .foldable import fold_roots, kept_by_default
 from .folded_part import FoldedPart, Seen, folded_part, seen_from_roots
-from .rebuild import Stub, free_name, moved_load, names_in, stub_of
+from .rebuild import Stub, WasAt, free_name, moved_load, names_in, stub_of
+from .root_volts import root_volts
 
 __all__ = ["LEVEL", "WITHIN", "Folded", "FoldedRoot", "fold"]
 
@@ -22,8 +25,6 @@ Complex = NDArray[np.complex128]
 
 LEVEL = 0.625
 """Level of the loads at which the fold is exact: the mean of what a study draws by default."""
-ENDS = (0.25, 1.0)
-"""Levels at which the kinds of equivalents are compared."""
 WITHIN = 1e-3
 """A root gets an equivalent bus of its own where loads at the root would miss by more."""
 
@@ -42,11 +43,6 @@ class FoldedRoot:
     km: float  #: of lines at the root's own voltage
     kind: Kind
     misfit: float  #: of the root's admittance with linear loads, at the worse end of ``ENDS``
-
-    @property
-    def km_lost(self) -> float:
-        """Length on which nothing can break any more."""
-        return 0.0 if self.kind in ("line", "both") else self.km
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,17 +85,20 @@ def fold(
         Equivalents to choose from, the first that is near enough or else the nearest.
     """
     volts = bus_volts(feeder)
-    root_of = fold_roots(feeder, kept_by_default(feeder) | set(keep))
+    root_of = _loaded_ones(feeder, fold_roots(feeder, kept_by_default(feeder) | set(keep)))
     if not root_of:
         nothing = dict.fromkeys(("buses_before", "buses_after"), len(volts))
         return Folded(feeder=feeder, **nothing, level=level, roots=(), kept=frozenset(volts))
     part = folded_part(feeder, root_of)
-    root_v = _root_volts(part, volts)
+    root_v = root_volts(feeder, part.roots, level)
     own = _rows_of_loads(part)
     state = seen_from_roots(part, root_v, level)
+    seen = _seen_roots(part, state, root_v, own)
     km = _km(feeder, root_of, volts)
-    how = _Choice(kinds=kinds, within=within, level=level, km=[km[root] for root in part.roots])
-    chosen = _choose(how, part, state, root_v, own)
+    how = Choice(kinds=kinds, within=within, level=level)
+    chosen = [
+        best_equivalent(how, each, km[root]) for each, root in zip(seen, part.roots, strict=True)
+    ]
     accounts = _accounts(feeder, root_of, km, chosen)
     taken = names_in(feeder)
     stubs: list[Stub] = []
@@ -109,12 +108,12 @@ def fold(
         ends = (account.root, free_name(account.root, taken))
         hertz = feeder.source.frequency_hz
         stubs.append(stub_of(ends, equivalent, account.km, rating, hertz))
-        stub_v = equivalent.stub_gain @ root_v[n]
+        v = gain_through(equivalent, level, seen[n].loads) @ root_v[n]
         for fit, rows in zip(equivalent.fits, own[n], strict=True):
             load = part.loads[part.branch_load[rows[0]]]
-            v_was = float(np.abs(state.branch_v[rows]).mean())
-            there = (_mean_y(state, rows), v_was, float(part.branch_v[rows[0]]))
-            moved[load.name] = moved_load(load, stubs[-1].bus, fit, there, stub_v)
+            was = _was_at(part, state, rows)
+            how_there = (fit, equivalent.paired)
+            moved[load.name] = moved_load(load, stubs[-1].bus, how_there, was, v)
     return Folded(
         feeder=_rebuilt(feeder, root_of, stubs, moved),
         buses_before=len(volts),
@@ -125,11 +124,31 @@ def fold(
     )
 
 
-def _root_volts(part: FoldedPart, volts: Mapping[str, float]) -> Complex:
-    """(R, 3) nominal voltages of the roots."""
-    turn = np.exp(-2j * np.pi / 3.0 * np.arange(3))
-    size = np.array([volts[root] for root in part.roots])
-    return np.asarray(size[:, None] * turn, np.complex128)
+def _loaded_ones(feeder: Feeder, root_of: Mapping[str, str]) -> dict[str, str]:
+    """What hangs on a root without any load stays as it is: it is no more than its length."""
+    places = (load.place.bus or "" for load in feeder.loads if load.place is not None)
+    loaded = {root_of[bus] for bus in places if bus in root_of}
+    return {bus: root for bus, root in root_of.items() if root in loaded}
+
+
+def _seen_roots(
+    part: FoldedPart, state: Seen, root_v: Complex, own: list[list[NDArray[np.int64]]]
+) -> list[SeenRoot]:
+    """What each root sees, at the level of the fold and around it."""
+    bare = seen_from_roots(part, root_v, 0.0)
+    ends = [seen_from_roots(part, root_v, at, state.branch_y_s).y_s for at in ENDS]
+    return [
+        SeenRoot(
+            whole_s=state.y_s[n],
+            bare_s=bare.y_s[n],
+            ends_s=[y[n] for y in ends],
+            loads=[
+                SeenLoad(y_s=_mean_y(state, k), gain=state.gain[k], bare_gain=bare.gain[k])
+                for k in rows
+            ],
+        )
+        for n, rows in enumerate(own)
+    ]
 
 
 def _rows_of_loads(part: FoldedPart) -> list[list[NDArray[np.int64]]]:
@@ -141,60 +160,19 @@ def _rows_of_loads(part: FoldedPart) -> list[list[NDArray[np.int64]]]:
     return own
 
 
+def _was_at(part: FoldedPart, state: Seen, rows: NDArray[np.int64]) -> WasAt:
+    """A load's branches on average; they are equal but for their voltages."""
+    v, nominal_v = float(np.abs(state.branch_v[rows]).mean()), float(part.branch_v[rows[0]])
+    return WasAt(
+        y_s=_mean_y(state, rows),
+        factors=law_factors(part.laws, int(part.branch_load[rows[0]]), v / nominal_v),
+        v=v,
+        nominal_v=nominal_v,
+    )
+
+
 def _mean_y(state: Seen, rows: NDArray[np.int64]) -> complex:
     return complex(state.branch_y_s[rows].mean())
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Choice:
-    """How equivalents are chosen, as ``fold`` was told."""
-
-    kinds: Sequence[Kind]
-    within: float
-    level: float
-    km: Sequence[float]  #: of each root
-
-    def kinds_for(self, root: int, loads: int) -> list[Kind]:
-        """What may stand for the folded part: length stays length, where there is any."""
-        if not loads:
-            return ["bus"]
-        useless = "units" if self.km[root] > 0.0 else "both"
-        return [kind for kind in self.kinds if kind != useless]
-
-
-def _choose(
-    how: _Choice,
-    part: FoldedPart,
-    state: Seen,
-    root_v: Complex,
-    own: list[list[NDArray[np.int64]]],
-) -> list[tuple[Equivalent, float]]:
-    """Of each root the first equivalent that is near enough or else the nearest; its misfit."""
-    bare = seen_from_roots(part, root_v, 0.0)
-    truth = [seen_from_roots(part, root_v, at, state.branch_y_s).y_s for at in ENDS]
-    found: list[tuple[Equivalent, float]] = []
-    for n, rows in enumerate(own):
-        loads = [
-            SeenLoad(y_s=_mean_y(state, k), gain=state.gain[k], bare_gain=bare.gain[k])
-            for k in rows
-        ]
-        tried: list[tuple[Equivalent, float]] = []
-        for kind in how.kinds_for(n, len(loads)):
-            equivalent = equivalent_of(kind, how.level, state.y_s[n], bare.y_s[n], loads)
-            off = max(
-                _gap(seen_through(equivalent, at, loads), y[n])
-                for at, y in zip(ENDS, truth, strict=True)
-            )
-            tried.append((equivalent, off))
-            if off <= how.within:
-                break
-        found.append(min(tried, key=lambda pair: pair[1]))
-    return found
-
-
-def _gap(found: Complex, wanted: Complex) -> float:
-    size = float(np.linalg.norm(wanted))
-    return float(np.linalg.norm(found - wanted)) / size if size else 0.0
 
 
 def _km(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,23 +13,17 @@ from scipy.sparse import coo_matrix, csc_matrix, diags
 from scipy.sparse.linalg import splu
 
 from ..buses import bus_volts
+from ..laws import law_rows
+from ..machines import load_va
 from ..parts import Feeder, Load
-from .primitives import (
-    Terminal,
-    branches_of,
-    law_factors,
-    line_primitive,
-    nominal_kv,
-    nominal_va,
-    unit_primitive,
-)
+from ..solver.assemble import law_factors
+from ..units import branches_of
+from .primitives import Terminal, line_primitive, unit_primitive
 
 __all__ = ["FoldedPart", "Seen", "folded_part", "seen_from_roots"]
 
 Complex = NDArray[np.complex128]
 
-ANTI_FLOAT = 1e-11
-"""Share of the largest admittance put from every node to earth, so that none can float."""
 PASSES = 60
 SETTLED_PU = 1e-10
 
@@ -45,6 +39,7 @@ class FoldedPart:
     root_y_s: Complex  #: (R, 3, 3) what the folded elements put on their root alone
     owner: NDArray[np.int64]  #: (inside,) root of each
     loads: tuple[Load, ...]
+    laws: NDArray[np.float64]  #: (L, 14) rows for ``law_factors``
     branch_load: NDArray[np.int64]  #: (P,)
     branch_from: NDArray[np.int64]  #: (P,) terminal
     branch_to: NDArray[np.int64]  #: (P,) terminal, or -1
@@ -69,8 +64,10 @@ def folded_part(feeder: Feeder, root_of: Mapping[str, str]) -> FoldedPart:
     inside: dict[Terminal, int] = {}
     own, out = _Entries(), _Entries()
     root_y = np.zeros((len(roots), 3, 3), np.complex128)
+    codes = {code.name: code for code in feeder.codes}
+    hertz = feeder.source.frequency_hz
     elements = [
-        line_primitive(feeder, line)
+        line_primitive(line, codes.get(line.code or ""), hertz)
         for line in feeder.lines
         if line.from_bus in root_of or line.to_bus in root_of
     ]
@@ -131,17 +128,17 @@ def _branches(
         bus = load.place.bus if load.place is not None else None
         if bus is None or bus not in root_of:
             continue
-        rows = branches_of(load.phases, load.connection)
-        v = nominal_kv(load, volts[bus]) * 1000.0
+        rows, v = branches_of(load, volts[bus])
         for start, end in rows:
             columns["load"].append(len(loads))
             columns["from"].append(inside[bus, start])
             columns["to"].append(inside[bus, end] if end >= 0 else -1)
-            columns["y"].append(np.conj(nominal_va(load)) / len(rows) / v**2)
+            columns["y"].append(load_va(load).conjugate() / len(rows) / v**2)
             columns["v"].append(v)
         loads.append(load)
     return {
         "loads": tuple(loads),
+        "laws": law_rows(replace(feeder, loads=tuple(loads)))[0],
         "branch_load": np.array(columns["load"], np.int64),
         "branch_from": np.array(columns["from"], np.int64),
         "branch_to": np.array(columns["to"], np.int64),
@@ -158,13 +155,11 @@ def seen_from_roots(
     Each load's admittance settles at its own voltage, or is that of ``linear_s`` (P,); what the
     root sees is then that of a linear network with these admittances.
     """
-    earth = part.network.diagonal()
-    leak = diags(np.full(earth.shape, ANTI_FLOAT * np.abs(earth).max(initial=1.0)))
     pick = _incidence(part)
     y = part.branch_y_s if linear_s is None else linear_s
     v = np.zeros(y.shape, np.complex128)
     for _ in range(PASSES):
-        inverse = splu(csc_matrix(part.network + leak + pick.T @ diags(level * y) @ pick))
+        inverse = splu(csc_matrix(part.network + pick.T @ diags(level * y) @ pick))
         unit = -inverse.solve(_per_phase(part))
         gain = pick @ unit
         before, v = v, np.einsum("pk,pk->p", gain, root_v[_root_of_branch(part)])
@@ -204,7 +199,7 @@ def _root_of_branch(part: FoldedPart) -> NDArray[np.int64]:
 def _at_voltage(part: FoldedPart, v_pu: NDArray[np.float64]) -> Complex:
     """(P,) admittance of every branch at its voltage."""
     laws = [
-        law_factors(part.loads[k], v)
+        law_factors(part.laws, k, v)
         for k, v in zip(part.branch_load.tolist(), v_pu.tolist(), strict=True)
     ]
     factors = np.array(laws).reshape(-1, 2)

@@ -11,17 +11,12 @@ from numpy.typing import NDArray
 
 from ..parts import Feeder, InlineTransformer, Line, LineCode, Load, Place, Regulator, Switch
 from .equivalent import Equivalent, Fit, across
-from .primitives import law_factors
 
-__all__ = ["Stub", "free_name", "moved_load", "names_in", "stub_of"]
+__all__ = ["Stub", "WasAt", "free_name", "moved_load", "names_in", "stub_of"]
 
 Complex = NDArray[np.complex128]
 
 SHORTEST_KM = 1e-3
-
-
-UNITS_SHARE = 0.1
-"""Of the impedance on the way, where a line and units share it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,37 +29,44 @@ class Stub:
     units: tuple[InlineTransformer, ...] = ()
 
 
-def moved_load(
-    load: Load, bus: str, fit: Fit, there: tuple[complex, float, float], v: Complex
-) -> Load:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WasAt:
+    """Where a load stood: what its branches were, at the level of the fold."""
+
+    y_s: complex  #: of a branch, at its voltage
+    factors: tuple[float, float]  #: conductance and susceptance there, over the nominal ones
+    v: float  #: of a branch
+    nominal_v: float
+
+
+def moved_load(load: Load, bus: str, how: tuple[Fit, bool], was: WasAt, v: Complex) -> Load:
     """Return the load as it stands at ``bus``.
 
     Parameters
     ----------
     load : Load
     bus : str
-    fit : Fit
-    there : complex, float, float
-        Where it stood: the admittance of a branch at its voltage, that voltage, and the nominal
-        one, volts.
+    how : Fit, bool
+        Where between the root's phases, and whether units have made phases of these pairs.
+    was : WasAt
     v : (3,) array
-        Voltages of the phases of ``bus`` at the level of the fold.
+        Voltages before the load, in the phases of the root.
     """
-    y, v_was, v_nominal = there
-    p_factor, q_factor = law_factors(load, v_was / v_nominal)
+    fit, paired = how
     here = across(fit.phases, fit.connection)
-    v_now = float(np.abs(here @ v).mean())
     # its own law meets the same voltage in pu as before
-    kv = v_nominal * v_now / v_was / 1000.0
-    y = fit.share * y
+    kv = was.nominal_v * float(np.abs(here @ v).mean()) / was.v / 1000.0
+    y = fit.share * was.y_s
+    p_factor, q_factor = was.factors
     kva = complex(y.real / p_factor, -y.imag / q_factor) * kv**2 * 1000.0 * len(here)
     return replace(
         load,
         place=Place(bus=bus),
-        connection=fit.connection,
-        phases=fit.phases,
+        connection="wye" if paired else fit.connection,
+        phases=fit.phases if not paired or fit.phases == "abc" else fit.phases[0],
         branch_kv=kv,
         kw=max(kva.real, 0.0) if load.kw >= 0.0 else kva.real,
+        power_factor=1.0,
         kvar=kva.imag,
     )
 
@@ -90,29 +92,27 @@ def stub_of(
     frequency_hz : float
     """
     root, bus = ends
-    kind, z, iron = equivalent.kind, equivalent.z_ohm, equivalent.far_s - equivalent.near_s
+    kind = equivalent.kind
     if kind == "bus":
         return Stub(bus=root)
     if kind == "units":
-        return Stub(bus=bus, units=_units((root, bus), z, iron, rating))
-    if kind == "line":
-        line, code = _line(ends, z, equivalent.near_s, km, frequency_hz)
-        return Stub(bus=bus, line=line, code=code)
-    middle = f"{bus}.line"
-    leakage = UNITS_SHARE * np.diag(z.diagonal())
-    line, code = _line((root, middle), z - leakage, equivalent.near_s, km, frequency_hz)
-    return Stub(bus=bus, line=line, code=code, units=_units((middle, bus), leakage, iron, rating))
+        return Stub(bus=bus, units=_units(ends, equivalent, rating))
+    between = bus if kind == "line" else f"{bus}.line"
+    line, code = _line((root, between), equivalent, km, frequency_hz)
+    units = () if kind == "line" else _units((between, bus), equivalent, rating)
+    return Stub(bus=bus, line=line, code=code, units=units)
 
 
 def _line(
-    ends: tuple[str, str], z: Complex, half_s: Complex, km: float, frequency_hz: float
+    ends: tuple[str, str], equivalent: Equivalent, km: float, frequency_hz: float
 ) -> tuple[Line, LineCode]:
     """A line of a code of its own, in the phases that have an impedance."""
     root, bus = ends
+    z = equivalent.line_z_ohm
     rows = np.flatnonzero(z.diagonal() != 0.0)
     chosen = np.ix_(rows, rows)
     length = max(km, SHORTEST_KM)
-    nf = 2.0 * half_s[chosen].imag / (math.tau * frequency_hz) * 1e9
+    nf = 2.0 * equivalent.half_s[chosen].imag / (math.tau * frequency_hz) * 1e9
     code = LineCode(
         name=bus,
         r_ohm_per_km=_as_rows(z[chosen].real / length),
@@ -131,28 +131,30 @@ def _line(
 
 
 def _units(
-    ends: tuple[str, str], z: Complex, iron: Complex, rating: tuple[float, float]
+    ends: tuple[str, str], equivalent: Equivalent, rating: tuple[float, float]
 ) -> tuple[InlineTransformer, ...]:
     """Single-phase transformers of ratio one, with their share of what the folded ones took."""
     root, bus = ends
     kva, volts = rating
-    base = volts**2 / (kva * 1000.0)
+    kv = volts / 1000.0 * (3.0**0.5 if equivalent.paired else 1.0)
+    base = kv**2 * 1000.0 / kva
+    pairs = ("ab", "bc", "ca") if equivalent.paired else ("a", "b", "c")
     return tuple(
         InlineTransformer(
-            name=f"{bus}.{phase}",
+            name=f"{bus}.{phases}",
             from_bus=root,
             to_bus=bus,
             connection="single",
             rating_kva=kva,
-            kv_from=volts / 1000.0,
-            kv_to=volts / 1000.0,
-            leakage_pu=complex(z[row, row] / base),
-            magnetizing_pu=complex(iron[row, row] * base),
-            phases=phase,
-            to_phases=phase,
+            kv_from=kv,
+            kv_to=kv,
+            leakage_pu=complex(equivalent.unit_z_ohm[row] / base),
+            magnetizing_pu=complex(equivalent.unit_y_s[row] * base),
+            phases=phases,
+            to_phases="abc"[row],
         )
-        for row, phase in enumerate("abc")
-        if z[row, row] != 0.0
+        for row, phases in enumerate(pairs)
+        if equivalent.unit_z_ohm[row] != 0.0
     )
 
 

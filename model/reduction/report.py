@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
+from .choose import ENDS
 from .equivalent import Kind
-from .fold import ENDS, Folded
+from .fold import Folded
 from .measure import LEVEL_RANGE, OWN_RANGE, Measured, Spread
 
 __all__ = ["folded_json", "folded_text"]
@@ -35,10 +36,6 @@ def folded_text(folded: Folded, measured: Measured | None = None) -> list[str]:
         lines.append(
             f"  admittance of a root at levels {ENDS[0]:g} and {ENDS[1]:g}:"
             f" off by at most {_pct(worst.misfit)} ('{worst.root}')"
-        )
-    if lost := sum(root.km_lost for root in roots):
-        lines.append(
-            f"  {lost:.2f} of {sum(r.km for r in roots):.2f} km folded have no breaks left"
         )
     if measured is not None:
         lines += _measured_text(measured)

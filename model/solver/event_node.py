@@ -74,17 +74,40 @@ def end_at(work: Work, k: int, carried: Flags) -> None:
 
 
 @compiled_apart
+def climb_low(
+    tree: Tree, work: Work, k: int, slot: int, z: Matrix, carried: Flags, x_j: Vector
+) -> int:
+    """Begin at the lower end of edge k and climb over ``z``; returns flags.
+
+    F and H of that slot of ``event`` lead to the node's voltage, loose modes of the edge included.
+    """
+    start_at(work, k, load(work.y, k), x_j, carried)
+    if tree.loose_from[k + 1] == tree.loose_from[k]:
+        climb_series(work, slot, z, carried)
+        return 0
+    flags = free_modes(tree, k, work, carried)
+    climb_series(work, slot, z, carried)
+    p, event_h = load(work.here, 1), work.event_h[slot]
+    store(work.event, slot, product(p, load(work.event, slot)))
+    ahead = times(p, load_vector(work.event_j, slot))
+    store_vector(work.event_j, slot, plus(ahead, load_vector(work.here_j, 1)))
+    for c in range(carried.size):
+        if carried[c]:
+            store(event_h, c, add(product(p, load(event_h, c)), load(work.here_h, c)))
+    return flags
+
+
+@compiled_apart
 def climb_event(
-    work: Work, k: int, y: Matrix, z: Matrix, share: float, mask: int, carried: Flags, x_j: Vector
+    tree: Tree, work: Work, k: int, z: Matrix, share: float, mask: int, carried: Flags, x_j: Vector
 ) -> int:
     """Eliminate edge k with the event node on it; returns flags."""
-    start_at(work, k, y, x_j, carried)
-    climb_series(work, BELOW, scaled(z, 1.0 - share), carried)
+    flags = climb_low(tree, work, k, BELOW, scaled(z, 1.0 - share), carried, x_j)
     x_j = load_vector(work.here_j, 0)
     fed = x_j[0] != 0.0 or x_j[1] != 0.0 or x_j[2] != 0.0
     for c in range(carried.size):
         fed |= carried[c]
-    flags = cross(work, scaled(z, share), mask, 1, carried)
+    flags |= cross(work, scaled(z, share), mask, 1, carried)
     if mask == 7 and not fed:
         flags |= DEAD
     end_at(work, k, carried)
@@ -136,19 +159,13 @@ def descend_event(
 
 
 @compiled_apart
-def climb_loose(
-    tree: Tree, work: Work, k: int, y: Matrix, z: Matrix, carried: Flags, x_j: Vector
-) -> int:
+def climb_loose(tree: Tree, work: Work, k: int, z: Matrix, carried: Flags, x_j: Vector) -> int:
     """Eliminate edge k, at whose lower end modes are loose; returns flags."""
-    start_at(work, k, y, x_j, carried)
-    flags = free_modes(tree, k, work, carried)
-    p, p_j = load(work.here, 1), load_vector(work.here_j, 1)
-    climb_series(work, LOOSE, z, carried)
+    flags = climb_low(tree, work, k, LOOSE, z, carried, x_j)
     end_at(work, k, carried)
-    store(work.f, k, product(p, load(work.event, LOOSE)))
-    store_vector(work.h_j, k, plus(times(p, load_vector(work.event_j, LOOSE)), p_j))
+    store(work.f, k, load(work.event, LOOSE))
+    store_vector(work.h_j, k, load_vector(work.event_j, LOOSE))
     for c in range(carried.size):
         if carried[c]:
-            ahead = product(p, load(work.event_h[LOOSE], c))
-            store(work.h[k], c, add(ahead, load(work.here_h, c)))
+            store(work.h[k], c, load(work.event_h[LOOSE], c))
     return flags

@@ -57,7 +57,7 @@ from .matrix3 import (
 )
 from .series import carry, carry_current, per_fork, up
 from .settle import is_linear, positive, see_magnitudes, update_magnitudes
-from .turns import turn_edge
+from .turns import transposed, turn_edge, turn_of
 
 __all__ = ["solve_block"]
 
@@ -89,16 +89,16 @@ def climb(tree: Tree, state: State, work: Work, s: int) -> int:
             continue
         for c in range(chords):
             if tree.tail[c] == k:
-                flags |= climb_chord(tree, work, c, edge == last + c, share, mask)
+                flags |= climb_chord(tree, state, work, c, s)
         y, z, drawn, carried = load(y_all, k), load(z_all, k), load_vector(y_j, k), tree.carried[k]
         turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
         if turned and in_loop[k]:
             for c in range(chords):
                 store(work.x_low[k], c, load(work.x[k], c))
         if k == edge:
-            flags |= climb_event(work, k, y, z, share, mask, carried, drawn)
+            flags |= climb_event(tree, work, k, z, share, mask, carried, drawn)
         elif tree.loose_from[k + 1] > tree.loose_from[k]:
-            flags |= climb_loose(tree, work, k, y, z, carried, drawn)
+            flags |= climb_loose(tree, work, k, z, carried, drawn)
         else:
             f, w = up(y, z)
             store(f_all, k, f)
@@ -158,13 +158,14 @@ def hand_up(tree: Tree, work: Work, k: int, parent: int) -> None:
 
 
 @compiled_apart
-def climb_chord(tree: Tree, work: Work, c: int, happening: bool, share: float, mask: int) -> int:
+def climb_chord(tree: Tree, state: State, work: Work, c: int, s: int) -> int:
     """Add chord c to its tail's Y and start the fill; returns flags.
 
     An event on it is climbed over from the farther end, so that what is inverted is never
     the small part of the impedance.
     """
-    tail, last = tree.tail[c], tree.parent.size
+    last = tree.parent.size
+    happening, share, mask = state.edge[s] == last + c, state.share[s], state.open_mask[s]
     w = load(tree.chord_y_s, c)
     flags = 0
     for d in range(tree.tail.size):
@@ -172,15 +173,13 @@ def climb_chord(tree: Tree, work: Work, c: int, happening: bool, share: float, m
         store(work.u[d], c, ZERO)
     store_vector(work.u_j, c, (0j, 0j, 0j))
     if not happening:
-        away = scaled(w, -1.0)
-        store(work.x[tail], c, away)
-        store(work.xt, c, away)
-        store(work.u[c], c, w)
-        store(work.y, tail, add(load(work.y, tail), w))
-        store(work.chord[0], c, w)
-        store(work.chord[1], c, away)
-        store(work.chord[2], c, away)
-        store(work.chord[3], c, w)
+        x = xt = scaled(w, -1.0)
+        u = w
+        if tree.regulator[last + c] >= 0 or tree.transformer[last + c] >= 0:
+            t = turn_of(tree, state, work, last + c, s)
+            back = transposed(t)
+            w, x, xt = product(back, product(u, t)), product(back, x), product(xt, t)
+        keep_chord(tree, work, c, w, x, xt, u)
         return flags
     z = load(tree.z_ohm, last + c)
     far = 1.0 - share if share <= 0.5 else share
@@ -196,6 +195,14 @@ def climb_chord(tree: Tree, work: Work, c: int, happening: bool, share: float, m
     w, x, xt, u = load(work.here, 0), load(work.here_x, c), load(work.xt, c), load(work.u[c], c)
     if share > 0.5:
         w, x, xt, u = u, xt, x, w
+    keep_chord(tree, work, c, w, x, xt, u)
+    return flags
+
+
+@compiled_apart
+def keep_chord(tree: Tree, work: Work, c: int, w: Matrix, x: Matrix, xt: Matrix, u: Matrix) -> None:
+    """Begin the fill of loop c at its tail."""
+    tail = tree.tail[c]
     store(work.chord[0], c, w)
     store(work.chord[1], c, x)
     store(work.chord[2], c, xt)
@@ -204,7 +211,6 @@ def climb_chord(tree: Tree, work: Work, c: int, happening: bool, share: float, m
     store(work.xt, c, xt)
     store(work.u[c], c, u)
     store(work.y, tail, add(load(work.y, tail), w))
-    return flags
 
 
 @compiled_apart

@@ -9,7 +9,7 @@ from ..compiled import compiled, compiled_apart
 from ..states import State, Tree, Work
 from .matrix3 import IDENTITY, Matrix, load, load_vector, product, store, store_vector, times
 
-__all__ = ["regulator_turn", "transposed", "turn_edge"]
+__all__ = ["transposed", "turn_edge", "turn_of"]
 
 Flags = NDArray[np.bool_]
 
@@ -33,13 +33,18 @@ def regulator_turn(tree: Tree, state: State, work: Work, row: int, s: int) -> Ma
     return load(work.here, 2)
 
 
+@compiled
+def turn_of(tree: Tree, state: State, work: Work, k: int, s: int) -> Matrix:
+    """T of what stands at the upper end of edge k."""
+    if tree.regulator[k] >= 0:
+        return regulator_turn(tree, state, work, tree.regulator[k], s)
+    return load(tree.turn, tree.transformer[k])
+
+
 @compiled_apart
 def turn_edge(tree: Tree, state: State, work: Work, k: int, s: int, carried: Flags) -> None:
     """Put what stands at the upper end of edge k above the rest of it."""
-    if tree.regulator[k] >= 0:
-        t = regulator_turn(tree, state, work, tree.regulator[k], s)
-    else:
-        t = load(tree.turn, tree.transformer[k])
+    t = turn_of(tree, state, work, k, s)
     back = transposed(t)
     store(work.f, k, product(load(work.f, k), t))
     store(work.w, k, product(back, product(load(work.w, k), t)))

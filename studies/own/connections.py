@@ -145,8 +145,7 @@ def _told(feeder: Feeder, name: str, row: _Said, notes: list[str]) -> tuple[Feed
         return _with_inline(feeder, _connected(inline, row)), None
     why = why_not_hanging(feeder, inline)
     if why is not None:
-        stays = f"its connection stays {inline.connection}, which no study draws"
-        return feeder, f"{why}: {stays}"
+        return feeder, f"{why}; it stays {inline.connection}, and no study draws what it is"
     feeder, said = hang(feeder, inline)
     notes += [note for note in said if note not in notes]
     return feeder, None

@@ -29,6 +29,11 @@ class _Where:
     lines: Mapping[str, Line]
     at: Mapping[str, Sequence[Line]]  #: lines by either bus
     order: Mapping[str, int]  #: of buses as the source feeds them, one after the other
+    across: Mapping[str, Sequence[str]]  #: buses beyond the closed switches of each
+
+    def around(self, bus: str) -> list[str]:
+        """Return the bus, and those that only a closed switch parts from it."""
+        return [bus, *self.across.get(bus, ())]
 
 
 def with_points(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
@@ -36,7 +41,8 @@ def with_points(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
 
     The columns are ``name`` and ``bus``, and perhaps ``line`` and ``voltage_side``. Without a line
     the point stands on the only three-phase line that leads from the bus away from the source, or
-    at the end of the only one that ends there. A ``line`` may also name a switch or a regulator of
+    at the end of the only one that ends there; a closed switch between the bus and the line, such
+    as a fuse, does not count. A ``line`` may also name a switch or a regulator of
     the bus: the point then stands on the line behind it. These points take the place of all
     that the feeder had.
 
@@ -114,6 +120,11 @@ def _where(feeder: Feeder) -> _Where:
     for line in feeder.lines:
         at[line.from_bus].append(line)
         at[line.to_bus].append(line)
+    across: defaultdict[str, list[str]] = defaultdict(list)
+    for switch in feeder.switches:
+        if switch.closed:
+            across[switch.from_bus].append(switch.to_bus)
+            across[switch.to_bus].append(switch.from_bus)
     order = {bus: n for n, bus in enumerate(outwards(feeder))}
     buses = dict.fromkeys([*order, *at])
     return _Where(
@@ -121,6 +132,7 @@ def _where(feeder: Feeder) -> _Where:
         lines={line.name: line for line in feeder.lines},
         at=at,
         order=order,
+        across=across,
     )
 
 
@@ -141,7 +153,7 @@ def _placed(feeder: Feeder, where: _Where, row: Point) -> Point | str:
             wanted = wanted[len(prefix) :]
     line = by_name(tuple(where.lines), wanted)
     if line is not None:
-        return _on_line(where.lines[line], row)
+        return _on_line(where, where.lines[line], row)
     joints: dict[str, Switch | Regulator] = {part.name: part for part in feeder.switches}
     joints |= {part.name: part for part in feeder.regulators}
     joint = by_name(tuple(joints), wanted)
@@ -155,32 +167,38 @@ def _placed(feeder: Feeder, where: _Where, row: Point) -> Point | str:
     return _on_only_line(where, replace(row, bus=behind))
 
 
-def _on_line(line: Line, row: Point) -> Point | str:
-    if row.bus not in (line.from_bus, line.to_bus):
+def _on_line(where: _Where, line: Line, row: Point) -> Point | str:
+    ends = [bus for bus in where.around(row.bus) if bus in (line.from_bus, line.to_bus)]
+    if not ends:
         return f"line {line.name} does not end at {row.bus}"
     if len(line.phases) < 3:
         return f"line {line.name} has phases {line.phases} only; a point measures three"
-    return replace(row, line=line.name)
+    return replace(row, bus=ends[0], line=line.name)
 
 
 def _on_only_line(where: _Where, row: Point) -> Point | str:
     """On the only three-phase line away from the source, else at the end of the only one."""
-    own = where.order.get(row.bus)
-    if own is None:
+    if row.bus not in where.order:
         return f"nothing feeds {row.bus} while the open switches are open"
-    whole = [line for line in where.at.get(row.bus, ()) if len(line.phases) == 3]
+    whole = [
+        (bus, line)
+        for bus in where.around(row.bus)
+        for line in where.at.get(bus, ())
+        if len(line.phases) == 3
+    ]
 
-    def leads_on(line: Line) -> bool:
-        far = line.to_bus if line.from_bus == row.bus else line.from_bus
-        return where.order.get(far, -1) > own
+    def leads_on(bus: str, line: Line) -> bool:
+        far = line.to_bus if line.from_bus == bus else line.from_bus
+        return where.order.get(far, -1) > where.order.get(bus, -1) >= where.order[row.bus]
 
-    onwards = [line for line in whole if leads_on(line)]
+    onwards = [(bus, line) for bus, line in whole if leads_on(bus, line)]
     if not whole:
         return f"no three-phase line ends at {row.bus}"
     if len(onwards) > 1 or (not onwards and len(whole) > 1):
-        names = ", ".join(line.name for line in onwards or whole)
+        names = ", ".join(line.name for _, line in onwards or whole)
         return f"several lines leave {row.bus}: the column line must name one of {names}"
-    return replace(row, line=(onwards or whole)[0].name)
+    bus, line = (onwards or whole)[0]
+    return replace(row, bus=bus, line=line.name)
 
 
 def _same_place(one: Point, other: Point) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,8 @@ from ...model.reading.fields import did_you_mean
 from ...model.reading.toml_file import read_text
 
 __all__ = ["OwnTable", "Row", "number_in", "read_table"]
+
+_PLAIN = re.compile(r"[-+.0-9eE]+")
 
 MOST_FAULTS = 20  #: of a file; with more it is another file than was meant
 MOST_ROWS = 2_000_000
@@ -137,7 +140,7 @@ def number_in(table: OwnTable, row: Row, column: str, *, least: float = 0.0) -> 
     if not cell:
         return None
     try:
-        number = float(cell)
+        number = float(cell) if _PLAIN.fullmatch(cell) else math.nan
     except ValueError:
         number = math.nan
     if not (math.isfinite(number) and number >= least):

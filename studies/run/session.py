@@ -21,7 +21,7 @@ from ...model.reading.toml_file import read_text
 from ...model.reading.toml_lines import locator
 from ...optimise.certificate import needed_trials, share_of_alpha
 from ..loading import load_with_points
-from ..spec.study_file import Study, check_study, default_study, read_study
+from ..spec.study_file import Study, check_study, default_study, own_study_file, read_study
 from .blocks import run_blocks
 from .cases import Case
 from .certify import Rival, Validation, add_up, judged_pairs
@@ -100,9 +100,12 @@ def read_feeder(name: str) -> Feeder:
 
 def read_own_study(args: argparse.Namespace, feeder: Feeder) -> Study:
     """The study that was named, else the feeder's own; checked against the feeder."""
-    if args.study:
-        study = read_study(args.study)
-        check_study(study, feeder, str(args.study), locator(read_text(args.study)))
+    file = args.study or own_study_file(args.feeder)
+    if file:
+        study = read_study(file)
+        check_study(study, feeder, str(file), locator(read_text(file)))
+        if not args.study:
+            say(f"study: {file}, which stands beside the feeder file")
     else:
         study = default_study(args.feeder)
         check_study(study, feeder, "the default study")

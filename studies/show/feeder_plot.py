@@ -6,20 +6,31 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from ...model.parts import Feeder
+from ...model.parts import Feeder, Line, Switch
+from ...model.zones import outwards
 from .feeder_layout import FeederLayout, Mark, Tie, lay_out
+from .feeder_map import plot_feeder_map
+from .feeder_places import has_coordinates
 from .figures import BLUE, GREEN, ORANGE, PURPLE, RED, SKY, TALLEST, axes_or_new, house_style
 
 __all__ = ["plot_feeder"]
 
 SECTION_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
+MOST_ROWS = 40  #: of a schematic
 CROWDED = 24  #: units beyond which a schematic shows their names only
 
 
 @house_style()
 def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
-    """Draw a schematic of a feeder: km from the source, one row for each branch."""
-    layout = lay_out(feeder)
+    """Draw a feeder.
+
+    A plain small one is a schematic: km from the source, one row for each branch, and a label
+    for all that stands there. One with coordinates, laterals, in-line transformers, closed loops
+    or many branches is drawn by `feeder_map`.
+    """
+    layout = lay_out(feeder) if _is_plain(feeder) else None
+    if layout is None or layout.rows > MOST_ROWS:
+        return plot_feeder_map(feeder, ax)
     crowded = len(layout.units) > CROWDED
     row_height = 0.7 if crowded else 1.35
     ax = axes_or_new(ax, 11.0, 1.6 + min(row_height * layout.rows, TALLEST))
@@ -57,6 +68,16 @@ def plot_feeder(feeder: Feeder, ax: Axes | None = None) -> Axes:
         ncols=4,
     )
     return ax
+
+
+def _is_plain(feeder: Feeder) -> bool:
+    """Whether it is a tree of three-phase parts, without coordinates."""
+    closed = [switch for switch in feeder.switches if switch.closed]
+    edges = len(feeder.lines) + len(closed) + len(feeder.regulators)
+    parts: list[Line | Switch] = [*feeder.lines, *closed]
+    three = all(len(part.phases) == 3 for part in parts)
+    radial = edges == len(outwards(feeder)) - 1
+    return three and radial and not feeder.inline_transformers and not has_coordinates(feeder)
 
 
 def _legend(layout: FeederLayout) -> list[Line2D]:

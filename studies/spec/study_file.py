@@ -76,6 +76,7 @@ __all__ = [
     "default_study",
     "dump_population",
     "dump_study",
+    "own_study_file",
     "read_study",
     "resolved",
     "study_beside",
@@ -133,13 +134,19 @@ def default_study(feeder_name: str) -> Study:
     >>> default_study("my feeder") == Study()
     True
     """
-    if feeder_name not in shipped_feeders():
-        beside = study_beside(Path(feeder_name))
-        return read_study(beside) if beside.is_file() else Study()
+    beside = own_study_file(feeder_name)
+    if beside is not None:
+        return read_study(beside)
     file = _DATA / f"{feeder_name}.study.toml"
-    if not file.is_file():
+    if feeder_name not in shipped_feeders() or not file.is_file():
         return Study()
     return study_from_toml(file.read_text(encoding="utf-8"), file.name)
+
+
+def own_study_file(feeder_name: str) -> Path | None:
+    """Return the study file beside a feeder's file; None where there is none."""
+    beside = study_beside(Path(feeder_name))
+    return beside if feeder_name not in shipped_feeders() and beside.is_file() else None
 
 
 def study_beside(feeder_file: Path) -> Path:

@@ -137,7 +137,7 @@ def test_the_trunk_is_of_the_medium_voltage_network_and_ends_where_a_unit_leaves
     trunk = find_trunk(feeder)
     assert trunk is not None
     assert (trunk.head, trunk.end, round(trunk.kv_ll, 6)) == ("B0", "B3", 12.0)
-    assert trunk.ends_at == "the transformer mill"
+    assert "on all phases" in trunk.ends_at
     far_lv = replace(feeder, lines=(*feeder.lines, line("cable", "LV", "LV2", km=0.5)))
     assert find_trunk(far_lv) == trunk
 
@@ -154,13 +154,17 @@ def test_random_trees_get_points_that_make_sections(seed):
         (a.name, b.name) for a, b in pairwise(points)
     ]
     assert len(points) <= 4
-    # the end is as far from the source as any load is
-    ohm = {"B0": 0.0}
+    # the end is as far from the source as any bus that still feeds a hundredth of the load
+    ohm, up = {"B0": 0.0}, {}
     for bus, name in above.items():
         own = lines[name]
-        up = own.from_bus if own.to_bus == bus else own.to_bus
-        ohm[bus] = ohm[up] + abs(z1_ohm(feeder, own))
-    assert ohm[points[-1].bus] == pytest.approx(max(ohm.values()))
+        up[bus] = own.from_bus if own.to_bus == bus else own.to_bus
+        ohm[bus] = ohm[up[bus]] + abs(z1_ohm(feeder, own))
+    kw = {"B0": 0.0} | {f"B{load.name[1:]}": load.kw for load in feeder.loads}
+    for bus in reversed(list(above)):
+        kw[up[bus]] += kw[bus]
+    worth = [ohm[bus] for bus in ohm if kw[bus] >= 0.01 * kw["B0"]]
+    assert ohm[points[-1].bus] == pytest.approx(max(worth))
 
 
 def test_a_feeder_with_points_keeps_them():
@@ -176,3 +180,26 @@ def test_open_switches_end_the_trunk_and_one_place_is_refused():
     assert spread_points(beyond).feeder.points[-1].bus == "B3"
     with pytest.raises(ValueError, match="at least two places, got 1"):
         spread_points(feeder, 1)
+
+
+def test_three_single_phase_loads_are_a_three_phase_load_and_idle_units_are_none():
+    feeder = chain([1.0] * 6)
+    ones = tuple(
+        replace(plain_load(f"one{p}", Place(bus="B4")), phases=p, connection="wye") for p in "abc"
+    )
+    pair = replace(plain_load("pair", Place(bus="B6")), phases="ab")
+    idle = inline("idle", "B5", "LV", 12.0, 0.48)
+    trunk = find_trunk(replace(feeder, loads=(*ones, pair), inline_transformers=(idle,)))
+    assert trunk is not None
+    assert trunk.end == "B4"
+
+
+def test_a_trifle_at_the_far_end_is_not_worth_the_way():
+    feeder = chain([1.0] * 6)
+    main = plain_load("main", Place(bus="B4"), kw=1000.0)
+    trifle = plain_load("trifle", Place(bus="B6"), kw=9.0)
+    for kw, end in ((9.0, "B4"), (11.0, "B6")):
+        loads = (main, replace(trifle, kw=kw))
+        trunk = find_trunk(replace(feeder, loads=loads))
+        assert trunk is not None
+        assert trunk.end == end

@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 
 from openphase.model.buses import bus_volts
 from openphase.model.line_matrices import phase_rows, shunt_nf_per_km, z_ohm_per_km
-from openphase.model.parts import Capacitor, Feeder, InlineTransformer, Line, Load, Regulator
+from openphase.model.parts import (
+    Capacitor,
+    Feeder,
+    InlineTransformer,
+    Line,
+    LineCode,
+    Load,
+    Regulator,
+)
+from openphase.model.phases import conductors
 
 __all__ = ["Cut", "as_dss", "joined_buses", "node_name"]
 
@@ -90,6 +99,7 @@ class _Writer:
 
     def __init__(self, feeder: Feeder, bus_of: Callable[[str], str]) -> None:
         self.feeder = feeder
+        self.codes: dict[str | None, LineCode] = {code.name: code for code in feeder.codes}
         self.bus_of = bus_of
         self.neutrals: Counter[str] = Counter()
 
@@ -149,8 +159,8 @@ class _Writer:
         rows = phase_rows(line.phases)
         grid = np.ix_(rows, rows)
         km = line.length_km * share
-        z = z_ohm_per_km(self.feeder, line)[grid] * km
-        c = shunt_nf_per_km(self.feeder, line)[grid] * km
+        z = z_ohm_per_km(line, self.codes.get(line.code))[grid] * km
+        c = shunt_nf_per_km(line, self.codes.get(line.code))[grid] * km
         return (
             f"new line.{name} phases={len(rows)} bus1={start} bus2={end} length=1 units=none "
             f"rmatrix={_matrix(z.real)} xmatrix={_matrix(z.imag)} cmatrix={_matrix(c)} "
@@ -189,8 +199,10 @@ class _Writer:
 
     def regulator(self, own: Regulator, volts: float) -> list[str]:
         """One transformer for each unit, 1 MVA, its leakage in ohms on the from-side."""
+        if own.reference == "next":
+            raise ValueError("a closed delta's series windings lie between two buses: not written")
         out = []
-        for phase in own.phases:
+        for phase in conductors(own):
             if phase == own.reference:
                 z = own.jumper_ohm or SMALL_OHM
                 start, end = self.at(own.from_bus, phase), self.at(own.to_bus, phase)
@@ -200,8 +212,6 @@ class _Writer:
                 )
                 continue
             reference = own.reference
-            if reference == "next":
-                reference = "bca"["abc".index(phase)]
             ends = phase if reference == "earth" else phase + reference
             earth = (0,) if reference == "earth" else ()
             kv = volts / 1000.0 * (1.0 if reference == "earth" else ROOT)

@@ -23,7 +23,7 @@ from openphase.model.parts import Feeder
 from openphase.model.solve import quiet_state, solve
 from openphase.model.states import NOT_CONVERGED, Probes
 
-__all__ = ["EXACT", "Limits", "PairRow", "StateRow", "compare", "limits_of"]
+__all__ = ["EXACT", "Limits", "PairRow", "StateRow", "compare", "eq5", "limits_of"]
 
 Complex = NDArray[np.complex128]
 
@@ -65,6 +65,7 @@ class StateRow:
     state: str
     worst_pu: float
     worst_bus: str
+    worst_between_pu: float  #: the same without each bus's common mode
     compared: int  #: phases of buses
     without_common_mode: int
     left_out: int
@@ -118,9 +119,7 @@ def compare(
         for p, pair in enumerate(reference.pairs):
             if pair.name in state.z1_ohm:
                 here, there = network.node(pair.m), network.node(pair.n)
-                ours, condition = _eq5(
-                    *(_positive(x[:, [base, s]]) for x in (v[here], v[there], current[p]))
-                )
+                ours, condition = eq5(*(x[:, [base, s]] for x in (v[here], v[there], current[p])))
                 pairs.append(
                     PairRow(
                         state=state.name,
@@ -138,7 +137,11 @@ def _cut(feeder: Feeder, state: OpenState) -> Cut | None:
     if state.line is None or state.phase is None:
         return None
     line = next(line for line in feeder.lines if line.name == state.line)
-    return Cut(line=line.name, at=0.0 if line.from_bus == state.bus else 1.0, phases=state.phase)
+    # a switch at the line's end has a bus of its own between; the other end tells
+    at_end = line.to_bus == state.bus or (
+        line.from_bus != state.bus and line.to_bus.startswith(f"{state.bus}_")
+    )
+    return Cut(line=line.name, at=1.0 if at_end else 0.0, phases=state.phase)
 
 
 def _solved(
@@ -173,11 +176,17 @@ def _solved(
 
 
 def _edge(network: Network, pair: Pair) -> tuple[int, bool]:
-    """The edge between m and the bus towards n, and whether m is its lower end."""
-    for k, piece in enumerate(network.pieces):
-        if piece is not None and set(piece.ends) == {pair.m, pair.towards}:
-            first = piece.ends[0] == pair.m
-            return k, bool(first != network.upward[k])
+    """The edge that leaves m towards the next bus, and whether m is its lower end.
+
+    A fuse or switch at the line's end may stand between, with a bus of its own.
+    """
+    ends = [set(piece.ends) if piece is not None else set() for piece in network.pieces]
+    beside = {bus for pieces in ends if pair.towards in pieces for bus in pieces}
+    for reached in ({pair.towards}, beside - {pair.m}):
+        for k, piece in enumerate(network.pieces):
+            if piece is not None and pair.m in ends[k] and ends[k] & reached:
+                first = piece.ends[0] == pair.m
+                return k, bool(first != network.upward[k])
     raise ValueError(f"nothing leads from {pair.m} to {pair.towards}")
 
 
@@ -191,7 +200,7 @@ def _state_row(
 ) -> StateRow:
     floating = floating_nodes(feeder, cut)
     compared = without = left_out = 0
-    worst, worst_bus = 0.0, ""
+    worst, worst_bus, between = 0.0, "", 0.0
     for bus, theirs in state.volts.items():
         parts = [floating.get((bus, phase)) for phase in "abc"]
         off = ours[bus] - np.array(theirs)
@@ -205,10 +214,13 @@ def _state_row(
         own = float(np.abs(off[there]).max(initial=0.0)) / volts[bus]
         if not own <= worst:
             worst, worst_bus = own, bus
+        if there.all():
+            between = max(between, float(np.abs(off - off.mean()).max()) / volts[bus])
     return StateRow(
         state=state.name,
         worst_pu=worst,
         worst_bus=worst_bus,
+        worst_between_pu=between,
         compared=compared,
         without_common_mode=without,
         left_out=left_out,
@@ -222,15 +234,17 @@ def _positive(abc: Complex) -> Complex:
     return np.asarray((abc[0] + TURN * abc[1] + TURN**2 * abc[2]) / 3.0)
 
 
-def _eq5(v_m: Complex, v_n: Complex, i_m: Complex) -> tuple[complex, float]:
-    """Equation (5) and how much it magnifies relative errors of the six phasors, at worst.
+def eq5(v_m: Complex, v_n: Complex, i_m: Complex) -> tuple[complex, float]:
+    """Equation (5) of the positive sequence, from (3, 2) phasors before and after.
 
-    The products that numerator and denominator subtract, over what is left of them.
+    And how much it magnifies relative errors of these phasors, at worst: the products that
+    numerator and denominator subtract, over what is left of them.
     """
+    v_m, v_n, i_m = _positive(v_m), _positive(v_n), _positive(i_m)
     over = v_m[1] * v_n[0] - v_n[1] * v_m[0]
     under = i_m[1] * v_m[0] - v_m[1] * i_m[0]
-    lost = [abs(v_m[1] * v_n[0]) + abs(v_n[1] * v_m[0]), abs(i_m[1] * v_m[0])]
-    lost[1] += abs(v_m[1] * i_m[0])
+    above = abs(v_m[1] * v_n[0]) + abs(v_n[1] * v_m[0])
+    below = abs(i_m[1] * v_m[0]) + abs(v_m[1] * i_m[0])
     with np.errstate(divide="ignore", invalid="ignore"):
-        condition = 2.0 * (lost[0] / abs(over) + lost[1] / abs(under))
+        condition = 2.0 * (above / abs(over) + below / abs(under))
         return complex(over / under), float(condition)

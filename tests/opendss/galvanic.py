@@ -7,7 +7,8 @@ from collections.abc import Hashable
 from opendss.as_dss import Cut
 
 from openphase.model.line_matrices import shunt_nf_per_km
-from openphase.model.parts import Feeder, InlineTransformer
+from openphase.model.parts import Feeder, InlineTransformer, LineCode
+from openphase.model.phases import conductors
 
 __all__ = ["floating_nodes"]
 
@@ -47,7 +48,7 @@ def floating_nodes(feeder: Feeder, cut: Cut | None = None) -> dict[Node, Hashabl
         for phase in switch.phases if switch.closed else "":
             sets.join((switch.from_bus, phase), (switch.to_bus, phase))
     for own in feeder.regulators:
-        for phase in own.phases:
+        for phase in conductors(own):
             sets.join((own.from_bus, phase), (own.to_bus, phase))
             _reference(sets, own.from_bus, phase, own.reference)
     for unit in feeder.inline_transformers:
@@ -65,8 +66,9 @@ def floating_nodes(feeder: Feeder, cut: Cut | None = None) -> dict[Node, Hashabl
 
 
 def _lines(sets: _Sets, feeder: Feeder, cut: Cut | None) -> None:
+    codes: dict[str | None, LineCode] = {code.name: code for code in feeder.codes}
     for line in feeder.lines:
-        charged = shunt_nf_per_km(feeder, line).any()
+        charged = bool(shunt_nf_per_km(line, codes.get(line.code)).any())
         for phase in line.phases:
             ends: list[Hashable] = [(line.from_bus, phase), (line.to_bus, phase)]
             if cut is not None and cut.line == line.name and phase in cut.phases:

@@ -174,8 +174,9 @@ class _Grown:
         rng, phases = self.rng, self.phases[bus]
         reference = "earth"
         if phases == "abc" and rng.random() < 0.4:
-            reference = str(rng.choice(["a", "b", "c", "next"]))
+            reference = str(rng.choice(["a", "b", "c"]))
         far = self.seen(self.name(), phases, self.zone[bus])
+        phases = phases.replace(reference, "")
         base = self.volts[self.zone[bus]] ** 2 / 2.0
         self.regulators.append(
             Regulator(

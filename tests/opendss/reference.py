@@ -7,11 +7,12 @@ A reference holds states of two modes: ``direct`` (every load its nominal admitt
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-__all__ = ["OpenState", "Pair", "Reference", "compact", "read_compact", "read_reference"]
+__all__ = ["OpenState", "Pair", "Reference", "compact", "read_compact", "read_reference", "renamed"]
 
 DECIMALS = 3  #: of the volts that are kept
 
@@ -77,6 +78,29 @@ def read_reference(path: Path) -> Reference:
         pairs=tuple(pairs),
         states=tuple(_state(name, said) for name, said in told["states"].items()),
     )
+
+
+def renamed(reference: Reference, buses: Mapping[str, str], lines: Mapping[str, str]) -> Reference:
+    """The same with a feeder's names of buses and lines, where an import changed them."""
+    states = tuple(
+        replace(
+            state,
+            line=state.line and lines.get(state.line, state.line),
+            bus=state.bus and buses.get(state.bus, state.bus),
+            volts={buses.get(bus, bus): v for bus, v in state.volts.items()},
+        )
+        for state in reference.states
+    )
+    pairs = tuple(
+        replace(
+            pair,
+            m=buses.get(pair.m, pair.m),
+            n=buses.get(pair.n, pair.n),
+            towards=buses.get(pair.towards, pair.towards),
+        )
+        for pair in reference.pairs
+    )
+    return replace(reference, states=states, pairs=pairs)
 
 
 def _state(name: str, said: dict[str, Any]) -> OpenState:

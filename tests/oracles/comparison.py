@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from oracles.dense import DenseSolution, NoSolutionError, NotConvergedError, solve_dense
 from oracles.dense import Event as DenseEvent
 from oracles.dense_inline import nominal_volts
+from oracles.dense_parts import rows
 from oracles.random_happenings import Happening, dense_event
 
 from openphase.model.events.base import apply_event
@@ -18,7 +19,7 @@ from openphase.model.network import Network, detached_end
 from openphase.model.parts import Feeder
 from openphase.model.solve import solve, steady_state
 from openphase.model.solver.breaks import DEAD, FLOATING
-from openphase.model.states import NOT_CONVERGED, Answer, unit_voltages
+from openphase.model.states import NOT_CONVERGED, UNEARTHED, Answer, unit_voltages
 
 __all__ = ["TOLERANCE", "Case", "Outcome", "compare", "gap_pu", "outcomes"]
 
@@ -123,7 +124,7 @@ def winding_voltages(
     found = {
         name: units[tree.load_unit[n], :3, 0]
         if tree.load_unit[n] >= 0
-        else branches[tree.branch_load == n]
+        else branches[_own_branches(case, n)]
         for n, name in enumerate(network.loads)
     }
     own = network.machines
@@ -139,6 +140,18 @@ def winding_voltages(
         if shunt.exponent != 2.0:
             found[f"shunt {n}"] = units[-1, [shunt.phase], 0]
     return found
+
+
+def _own_branches(case: Case, load: int) -> list[int]:
+    """Places of a direct load's branches, in the order that its phases have in the file."""
+    tree, phases = case.network.tree, rows(case.feeder.loads[load].phases)
+    ends = [{int(a), int(b)} for a, b in zip(tree.branch_from, tree.branch_to, strict=True)]
+    pairs = [{k, -1} for k in phases]
+    if case.feeder.loads[load].connection == "delta":
+        around = zip(phases, [*phases[1:], phases[0]], strict=True)
+        pairs = [{a, b} for a, b in around][: 1 if len(phases) == 2 else 3]
+    own = np.flatnonzero(tree.branch_load == load)
+    return [next(int(k) for k in own if ends[k] == pair) for pair in pairs]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +173,7 @@ def compare(
     ladder found must be one as well: the reference, held at the ladder's voltages, must give
     them back.
     """
-    flagged = bool(answer.flags[0] & (DEAD | FLOATING))
+    flagged = bool(answer.flags[0] & (DEAD | FLOATING | UNEARTHED))
     try:
         oracle = solve_dense(case.feeder, case.closed, event, start=start, **state)
     except NoSolutionError:
@@ -195,7 +208,7 @@ def outcomes(case: Case) -> list[Outcome]:
     if before.how not in ("agree", "elsewhere"):
         return [before]
     second = carried_over(network, first, answer, second, event.der_factor)
-    answer = solve(network, second, start=answer.unit_v_pu)
+    answer = solve(network, second, start=answer.winding_v_pu)
     scale = {name: float(event.load_factor[n, 0]) for n, name in enumerate(network.loads)}
     state |= {"before": oracle, "load_scale": scale}
     return [before, compare(case, answer, case.event(after=True), oracle, **state)[0]]

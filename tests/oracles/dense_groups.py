@@ -46,33 +46,41 @@ class Law:
     v_min_pu: float = FLOOR_PU
     v_max_pu: float | None = None
     v_low_pu: float | None = None
+    edge_exponent: float | None = None
 
     @property
     def bends(self) -> bool:
         """Whether a branch is anything but a constant impedance."""
         both = {self.exponent, self.exponent if self.exponent_q is None else self.exponent_q}
-        return self.zip is not None or both != {2.0}
+        return self.zip is not None or both != {2.0} or self.edge_exponent not in (None, 2.0)
 
     def factors(self, pu: Floats) -> tuple[Floats, Floats]:
         """Conductance and susceptance over the nominal ones, at these voltages."""
-        within = np.clip(pu, self.v_min_pu, self.v_max_pu)
-        found = []
-        for n in range(2):
-            exponent = self.exponent_q if n and self.exponent_q is not None else self.exponent
-            at = self._over_square(n, exponent, within)
-            if self.v_low_pu is not None:
-                floor = float(self._over_square(n, exponent, np.array([self.v_min_pu]))[0])
-                at = np.where(
-                    pu < self.v_min_pu,
-                    np.interp(pu, [self.v_low_pu, self.v_min_pu], [1.0, floor]),
-                    at,
-                )
-            found.append(at)
-        return found[0], found[1]
+        p, q = (self._factor(n, pu) for n in range(2))
+        return p, q
 
-    def _over_square(self, n: int, exponent: float, v: Floats) -> Floats:
+    def _factor(self, n: int, pu: Floats) -> Floats:
+        """Of P (0) or Q (1). Down to ``v_low_pu`` it is the current that goes linearly."""
+        low = self.v_min_pu * self._at_limit(n, self.v_min_pu)
+        below = np.full(len(pu), low / self.v_min_pu)
+        if self.v_low_pu is not None:
+            current = np.interp(pu, [self.v_low_pu, self.v_min_pu], [self.v_low_pu, low])
+            below = np.where(pu < self.v_low_pu, 1.0, current / np.maximum(pu, self.v_low_pu))
+        within = self._over_square(n, np.clip(pu, self.v_min_pu, self.v_max_pu))
+        found = np.where(pu < self.v_min_pu, below, within)
+        if self.v_max_pu is not None:
+            found = np.where(pu > self.v_max_pu, self._at_limit(n, self.v_max_pu), found)
+        return np.asarray(found)
+
+    def _at_limit(self, n: int, v: float) -> float:
+        if self.edge_exponent is not None:
+            return float(v ** (self.edge_exponent - 2.0))
+        return float(self._over_square(n, np.array([v]))[0])
+
+    def _over_square(self, n: int, v: Floats) -> Floats:
         """What P (0) or Q (1) is of its nominal value, over the square of the voltage."""
         if self.zip is None:
+            exponent = self.exponent_q if n and self.exponent_q is not None else self.exponent
             return np.asarray(v ** (exponent - 2.0))
         z, i, p = self.zip[3 * n : 3 * n + 3]
         return np.asarray(z + i / v + p / v**2)

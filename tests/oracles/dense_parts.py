@@ -297,10 +297,10 @@ def add_load(circuit: Circuit, load: Load, at: Windings, scale: float, exponent:
     va = (va + 1000j * (load.kvar or 0.0)) * scale
     count = len(at.plus)
     y = np.conj(va) / count / at.v_nominal**2
-    limits = {name: getattr(load, name) for name in ("v_min_pu", "v_max_pu", "v_low_pu")}
-    law = Law(exponent=exponent, **limits)
+    own = ("exponent_q", "zip", "v_min_pu", "v_max_pu", "v_low_pu", "edge_exponent")
+    law = Law(exponent=exponent)
     if exponent == load.exponent:
-        law = Law(exponent=exponent, exponent_q=load.exponent_q, zip=load.zip, **limits)
+        law = Law(exponent=exponent, **{name: getattr(load, name) for name in own})
     static = (1 - load.motor_share) * np.eye(count, dtype=np.complex128)
     circuit.groups[load.name] = Group(
         plus=at.plus,

@@ -127,7 +127,7 @@ def _switch(ground: Ground, upper: Bus) -> None:
 def _regulator(ground: Ground, upper: Bus) -> None:
     """Wye where there is earth, in any phases; open or closed delta where there are three."""
     rng, zone = ground.rng, upper.zone
-    kinds: list[Reference] = ["earth"] if zone.earthed else []
+    kinds: list[Reference] = ["earth"] if zone.earthed and zone.solid else []
     if upper.phases == "abc" and not zone.legs:
         kinds += [chosen(rng, ["a", "b", "c"]), "next"]
     if not kinds:
@@ -141,7 +141,7 @@ def _regulator(ground: Ground, upper: Bus) -> None:
     ground.regulators.append(
         Regulator(
             name=ground.name("R"),
-            **_turned(rng, upper.name, lower.name, 0.2),
+            **_turned(rng, upper.name, lower.name, 0.2 if reference == "earth" else 0.0),
             taps=tuple(  # type: ignore[arg-type]
                 int(taps[0 if gang else k]) if "abc"[k] in phases else 0 for k in range(3)
             ),
@@ -150,7 +150,7 @@ def _regulator(ground: Ground, upper: Bus) -> None:
             phases=phases,
             reference=reference,
             z_ohm=polar(zone.ohm * float(rng.uniform(1e-3, 1e-2)), 80.0) if some else 0j,
-            jumper_ohm=complex(zone.ohm * 1e-4) if rng.random() < 0.5 else 0j,
+            jumper_ohm=complex(zone.ohm * 1e-4 * (rng.random() < 0.5) * (reference in "abc")),
             gang=gang,
         )
     )
@@ -208,6 +208,7 @@ def _three_phase(ground: Ground, upper: Bus) -> None:
         volts=kv * 1000.0 / ROOT,
         va=kva * 1000.0,
         earthed=(far == "Yg" and near != "Y") or bool(rng.random() < 0.3),
+        solid=far == "Yg" and near != "Y",
         like=(ground.name("zone"), zone.like[0], near, far, kv, shift, turned),
     )
     sides = [
@@ -253,6 +254,7 @@ def _bank(ground: Ground, upper: Bus) -> None:
         volts=float(rng.choice([277.0, 2400.0])),
         va=3000.0 * kva,
         earthed=len(bank[0][1]) == 1 or bool(rng.random() < 0.3),
+        solid=len(bank[0][1]) == 1,
         like=(ground.name("zone"),),
     )
     lower = ground.bus("abc", below)
@@ -291,6 +293,7 @@ def _single(ground: Ground, upper: Bus) -> None:
         volts=float(rng.choice([120.0, 2400.0, 12700.0])),
         va=3000.0 * kva,
         earthed=len(far) == 1 or bool(rng.random() < 0.4),
+        solid=len(far) == 1,
         like=(ground.name("zone"),),
     )
     unit = replace(

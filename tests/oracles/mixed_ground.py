@@ -33,6 +33,7 @@ class Zone:
     volts: float  #: phase to earth
     va: float
     earthed: bool  #: things may be connected to earth
+    solid: bool = True  #: and they are not the only ones that are
     legs: bool = False  #: behind a centre tap: its phases are opposite
     like: tuple[object, ...] = ()  #: zones that are alike have the same voltages
 
@@ -119,14 +120,14 @@ def new_ground(rng: np.random.Generator) -> Ground:
         earthed=wires == 4 and neutral != "isolated",
         like=("source",),
     )
-    z1 = polar(zone.ohm * float(rng.uniform(0.01, 0.05)), float(rng.uniform(75, 88)))
+    z1 = polar(zone.ohm * float(rng.uniform(0.01, 0.05)), float(rng.uniform(75, 85)))
     source = Source(
         bus="B0",
         kv_ll=kv,
         emf_pu=float(rng.uniform(0.98, 1.05)),
         z1_ohm=z1,
-        z2_ohm=z1 * polar(float(rng.uniform(0.7, 1.3)), float(rng.uniform(-5, 5))),
-        z0_ohm=z1 * polar(float(rng.uniform(0.4, 3.0)), float(rng.uniform(-10, 5))),
+        z2_ohm=z1 * polar(float(rng.uniform(0.7, 1.3)), float(rng.uniform(-5, 4))),
+        z0_ohm=z1 * polar(float(rng.uniform(0.4, 3.0)), float(rng.uniform(-10, 4))),
         frequency_hz=float(rng.choice([50.0, 60.0])),
         neutral=neutral,
         neutral_ohm=complex(rng.uniform(0.02, 0.5) * zone.ohm) if neutral == "resistor" else 0j,

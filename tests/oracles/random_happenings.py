@@ -69,7 +69,12 @@ def random_happening(rng: np.random.Generator, feeder: Feeder, network: Network)
         ganged = feeder.source.neutral in ("petersen", "isolated")
         size = (len(network.regulators), 1 if ganged else 3, 1)
         taps = 1 + 0.00625 * rng.integers(-2, 3, size=size)
-        event = replace(event, tap_factor=np.broadcast_to(taps, (len(network.regulators), 3, 1)))
+        taps = np.broadcast_to(taps, (len(network.regulators), 3, 1)).copy()
+        for row, own in zip(taps, feeder.regulators, strict=True):
+            # the ladder's z_ohm stays as the file's taps make it
+            fixed = [own.z_ohm != 0 or phase not in own.phases for phase in "abc"]
+            row[fixed] = 1.0
+        event = replace(event, tap_factor=taps)
     if rng.random() < 0.25:
         what.add("loads")
         event = replace(event, load_factor=rng.uniform(0.0, 1.4, (len(network.loads), 1)))
@@ -147,9 +152,9 @@ def _edge(rng: np.random.Generator, network: Network) -> int:
     lines = np.flatnonzero(network.length_km > 0)
     chosen = lines
     if network.chords and rng.random() < 0.5:
-        chord = len(network.nodes)
-        ring = [k for k in lines if k == chord or network.tree.in_loop[k]]
-        chosen = np.array([chord] if rng.random() < 0.4 else ring)
+        first = len(network.nodes)
+        ring = [k for k in lines if k >= first or network.tree.in_loop[k]]
+        chosen = lines[lines >= first] if rng.random() < 0.4 else np.array(ring)
     return int(rng.choice(chosen))
 
 

@@ -189,6 +189,8 @@ def _law(rng: np.random.Generator) -> dict[str, Any]:
     if rng.random() < 0.5:
         law["v_min_pu"] = float(rng.uniform(0.6, 0.95))
         law["v_low_pu"] = 0.5 if rng.random() < 0.5 else None
+    if rng.random() < 0.15:
+        law["edge_exponent"] = 0.0
     if rng.random() < 0.4:
         law["v_max_pu"] = float(rng.uniform(1.02, 1.1))
     return law
@@ -196,7 +198,12 @@ def _law(rng: np.random.Generator) -> dict[str, Any]:
 
 def _with_motors(rng: np.random.Generator, load: Load) -> Load:
     """Motors take all three phases, by the exponent alone."""
-    lawful = load.zip is None and load.exponent_q is None and load.v_max_pu is None
+    lawful = (
+        load.zip is None
+        and load.edge_exponent is None
+        and load.exponent_q is None
+        and load.v_max_pu is None
+    )
     if not lawful or load.v_min_pu != 0.7 or len(load.phases) < 3 or rng.random() < 0.6:
         return load
     share = float(rng.choice([1.0, rng.uniform(0.1, 0.9)]))

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import fields
 
 import numpy as np
 import pytest
 from oracles.comparison import TOLERANCE, Case, Outcome, compare, outcomes
-from oracles.random_happenings import Happening, random_happening
+from oracles.random_happenings import Happening, phases_of, random_happening
 from oracles.random_mixed import random_mixed_feeder
 
 from openphase.model.errors import InputError
 from openphase.model.events.base import no_event
+from openphase.model.feeder import make_feeder
 from openphase.model.network import compile_network
 from openphase.model.parts import Feeder
 from openphase.model.solve import solve, steady_state
@@ -30,6 +32,8 @@ def a_case(seed: int, *, linear: bool = False) -> Case | None:
     ties = [s.name for s in feeder.switches if not s.closed and rng.random() < 0.75]
     closed = frozenset([s.name for s in feeder.switches if s.closed] + ties)
     opened = _opened(rng, feeder) if loops else frozenset()
+    if not _every_phase_is_fed(feeder, closed, opened):
+        opened = frozenset()
     try:
         network = compile_network(feeder, closed, opened)
     except InputError:
@@ -38,8 +42,40 @@ def a_case(seed: int, *, linear: bool = False) -> Case | None:
     return Case(feeder=feeder, closed=closed, opened=opened, network=network, happening=happening)
 
 
+def _every_phase_is_fed(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) -> bool:
+    """No conductor is without a supply in this state of the switches."""
+    off = {(point.line, point.bus) for point in feeder.points if point.name in opened}
+    ends = [(own.name, own.phases, own.from_bus, own.to_bus) for own in feeder.lines]
+    joined = [
+        (phase, *(f"{bus}@{name}" if (name, bus) in off else bus for bus in buses))
+        for name, phases, *buses in ends
+        for phase in phases
+    ]
+    switches = [own for own in feeder.switches if own.name in closed]
+    joined += [(k, own.from_bus, own.to_bus) for own in switches for k in own.phases]
+    for own in feeder.regulators:
+        units = own.phases if own.reference == "earth" else "abc"
+        joined += [(phase, own.from_bus, own.to_bus) for phase in units]
+    steps = [({(k, a)}, {(k, b)}) for k, a, b in joined]
+    steps += [
+        ({(k, own.from_bus) for k in own.phases}, {(k, own.to_bus) for k in own.to_phases})
+        for own in feeder.inline_transformers
+    ]
+    fed = {(phase, feeder.source.bus) for phase in "abc"}
+    grown = True
+    while grown:
+        before = len(fed)
+        for near, far in steps:
+            fed |= far if near <= fed else set()
+            fed |= near if far <= fed else set()
+        grown = len(fed) > before
+    buses = {bus for _, _, *pair in ends for bus in pair}
+    there = {(phase, bus) for bus in buses for phase in phases_of(feeder, bus)}
+    return there <= fed and all(near | far <= fed for near, far in steps)
+
+
 def _opened(rng: np.random.Generator, feeder: Feeder) -> frozenset[str]:
-    """Sometimes a point stands open; where that leaves buses without a supply, none does."""
+    """Sometimes a point stands open."""
     names = [point.name for point in feeder.points]
     if not names or rng.random() < 0.7:
         return frozenset()
@@ -72,6 +108,13 @@ def test_no_state_differs(sample: Sample) -> None:
 
 def test_hardly_any_feeder_is_refused(sample: Sample) -> None:
     assert len(sample) >= 0.9 * FEEDERS
+
+
+def test_the_feeders_are_such_as_a_file_may_hold(sample: Sample) -> None:
+    bare = {"imported_from", "origins"}
+    for case, _ in sample.values():
+        given = {f.name: getattr(case.feeder, f.name) for f in fields(case.feeder)}
+        assert make_feeder(**{k: v for k, v in given.items() if k not in bare}) == case.feeder
 
 
 def test_the_ladder_settles(sample: Sample) -> None:

@@ -340,7 +340,7 @@ def test_what_one_node_does_to_another_is_mutual(seed: int) -> None:
     except InputError:
         pytest.skip("the network is refused")
     still = solve(network, steady_state(network)).v[:, :, 0]
-    nodes, phases = np.nonzero(np.abs(still) > 0.1 * np.abs(still).max(axis=1, keepdims=True))
+    nodes, phases = np.nonzero(np.abs(still) > 0.3 * network.node_v[:, None])
     first, second = rng.integers(len(nodes), size=2)
     ends = [(int(nodes[k]), int(phases[k])) for k in (first, second)]
     y = np.zeros((3, 2), np.complex128)
@@ -350,6 +350,10 @@ def test_what_one_node_does_to_another_is_mutual(seed: int) -> None:
         far_node=np.array([node for node, _ in ends]), far_y_s=y
     )
     moved = solve(network, state).v
+    if any(
+        abs(moved[node, k, s]) < 0.01 * network.node_v[node] for s, (node, k) in enumerate(ends)
+    ):
+        pytest.skip("nothing else is earthed there, so that no current flows")
     z = []
     for s in range(2):
         (node, phase), (other, at) = ends[s], ends[1 - s]

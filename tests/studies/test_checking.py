@@ -217,6 +217,14 @@ def test_a_feeder_without_sections_says_so() -> None:
     assert "(given so)" in text
 
 
+def test_a_picture_without_a_name_has_the_feeders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["check", "paper", "--plot"]) == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["paper.png"]
+
+
 def test_plot_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / "feeder.png"
     assert main(["check", "paper", "--plot", str(picture)]) == 0

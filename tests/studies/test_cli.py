@@ -40,6 +40,7 @@ def test_check_takes_a_feeder_and_a_picture():
     args = parse("check paper --plot feeder.svg --json")
     assert (args.feeder, args.plot, args.json) == ("paper", Path("feeder.svg"), True)
     assert parse("check paper").plot is None
+    assert parse("check paper --plot").plot == Path()
 
 
 def test_solve_closes_as_many_switches_as_asked():

@@ -78,6 +78,57 @@ def test_what_says_nothing_about_a_part_has_no_origin() -> None:
     assert ("source", 0, "neutral_ohm") not in origins
 
 
+MORE = """\
+[[codes]]
+name = "one"
+r_ohm_per_km = [[0.3]]
+x_ohm_per_km = [[0.8]]
+
+[[lines]]
+name = "twig"
+from = "B"
+to = "C"
+length_km = 1
+code = "one"
+phases = "b"
+
+[[inline_transformers]]
+name = "X"
+from = "B"
+to = "V"
+connection = "D/Y"
+rating_kva = 100
+kv_from = 12.47
+kv_to = 0.4
+leakage_pu = [0.01, 0.05]
+
+[[loads]]
+name = "hut"
+bus = "C"
+phases = "b"
+kw = 3
+kvar = 1
+zip = [1, 0, 0, 0, 0, 1]
+"""
+
+
+def test_what_another_field_takes_the_place_of_has_none_either() -> None:
+    origins = feeder_from_toml(TEXT + MORE, "f").origins
+    assert ("lines", "A", "c1_nf_per_km") in origins
+    assert ("lines", "twig", "c1_nf_per_km") not in origins
+    assert origins["lines", "A", "phases"] == "default"
+    assert origins["lines", "twig", "phases"] == "given"
+    assert origins["codes", "one", "c_nf_per_km"] == "default"
+    assert origins["loads", "inn", "power_factor"] == "default"
+    assert ("loads", "hut", "power_factor") not in origins
+    assert ("loads", "hut", "exponent") not in origins
+    assert ("loads", "unknown", "phases") not in origins
+    assert origins["inline_transformers", "X", "shift"] == "default"
+    assert ("inline_transformers", "X", "to_neutral_ohm") not in origins
+    assert ("inline_transformers", "X", "phases") not in origins
+    assert ("source", 0, "angle_deg") not in origins
+
+
 def test_an_imported_file_gives_nothing() -> None:
     given = feeder_from_toml(TEXT, "f")
     imported = feeder_from_toml(f'imported_from = "f.dss"\n{TEXT}', "f")

@@ -79,6 +79,15 @@ def test_what_cannot_stand_says_why(tmp_path, row, why):
     assert why in match.not_joined[0][1]
 
 
+@pytest.mark.parametrize("row", ["p,B1,,", "p,B1,L2,", "p,b1,fuse,"])
+def test_a_switch_between_bus_and_line_does_not_count(tmp_path, row):
+    lines = (line("L1", "B0", "B1"), line("L2", "B1_fuse", "B2"))
+    fuse = Switch(name="fuse", from_bus="B1", to_bus="B1_fuse", closed=True)
+    feeder = replace(FEEDER, lines=lines, switches=(fuse,))
+    told, _ = placed(tmp_path, row, feeder=feeder)
+    assert told.points == (Point(name="p", bus="B1_fuse", line="L2"),)
+
+
 def test_two_points_at_one_place_are_one(tmp_path):
     feeder, match = placed(tmp_path, "one,B0,,", "two,B0,L1,")
     assert [point.name for point in feeder.points] == ["one"]

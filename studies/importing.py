@@ -1,0 +1,153 @@
+"""``openphase import``: an OpenDSS file becomes a feeder file, with a fidelity report."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..model.errors import InputError
+from ..model.importers.dss_feeder import Imported, import_opendss
+from ..model.importers.fidelity import differences
+from ..model.importers.report import fidelity_report
+from ..model.importers.report_text import report_markdown, report_text
+from ..model.parts import Feeder
+from ..model.reading.feeder_file import write_feeder
+from ..model.reduction.fold import fold
+from ..model.reduction.measure import measure
+from ..model.reduction.report import folded_json, folded_text
+from ..model.spread import spread_points
+from .own.connections import with_transformers
+from .own.levels import measured_study_text
+from .own.match import Match, match_json, match_text
+from .own.peaks import with_peaks
+from .own.reclosers import with_points
+from .run.session import say
+from .run.store import as_json
+from .show.sheet import PAGE, wrapped
+
+__all__ = ["import_command"]
+
+_SEED = 1
+"""Of the scenarios on which a reduction is measured."""
+
+
+@dataclass(slots=True, kw_only=True)
+class _Work:
+    """The feeder on its way, and what is to be said of it."""
+
+    feeder: Feeder
+    matches: list[Match] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+    parts: dict[str, Any] = field(default_factory=dict)
+    study: str | None = None
+
+
+def import_command(args: argparse.Namespace) -> int:
+    """Run the verb; returns the exit code. Refusals have ended it before."""
+    _check_outputs(args)
+    say(f"reading {args.file}")
+    imported = import_opendss(args.file, drop=args.drop)
+    say(f"{len(imported.feeder.lines)} lines, {len(imported.feeder.loads)} loads; solving")
+    report = fidelity_report(imported, differences(imported))
+    work = _Work(feeder=imported.feeder)
+    _own_data(work, args)
+    if args.reduce:
+        _fold(work)
+    report |= {"own_data": [match_json(match) for match in work.matches], **work.parts}
+    text = [*report_text(report), *work.lines]
+    written = _write(work, args, imported)
+    report["written"] = [str(path) for path in written]
+    if args.report is not None:
+        _write_report(args.report, report, work.lines)
+        written.append(args.report)
+    for path in written:
+        say(f"wrote {path}")
+    print(as_json(report) if args.json else _page(text), end="")
+    return 0
+
+
+def _check_outputs(args: argparse.Namespace) -> None:
+    """Ask for somewhere to put the feeder before anything is worked out.
+
+    Raises
+    ------
+    InputError
+        Where nothing would be left, or an output would replace an input.
+    """
+    if args.output is None and args.report is None:
+        rule = "must be given: the feeder file to write (or --report FILE for the report alone)"
+        raise InputError.single("", "-o", None, rule)
+    if args.output is not None and args.output.suffix.lower() != ".toml":
+        raise InputError.single("", "-o", repr(str(args.output)), "must be a .toml file")
+    if args.report is not None and args.report.suffix.lower() not in (".md", ".json"):
+        raise InputError.single("", "--report", repr(str(args.report)), "must be .md or .json")
+
+
+def _own_data(work: _Work, args: argparse.Namespace) -> None:
+    """Bring in what the user knows of the feeder, and points where there are none."""
+    if args.transformers is not None:
+        work.feeder, match = with_transformers(work.feeder, args.transformers)
+        work.matches.append(match)
+    if args.points is not None:
+        work.feeder, match = with_points(work.feeder, args.points)
+        work.matches.append(match)
+    else:
+        spread = spread_points(work.feeder)
+        work.feeder = spread.feeder
+        work.lines += ["", *spread.said]
+        work.parts["points"] = {"said": list(spread.said), "inside": list(spread.inside)}
+    if args.peaks is not None:
+        work.feeder, measured, match = with_peaks(work.feeder, args.peaks)
+        work.matches.append(match)
+        if measured and args.output is not None:
+            work.study = measured_study_text(measured, args.peaks.name)
+    for match in work.matches:
+        work.lines += ["", *match_text(match)]
+
+
+def _fold(work: _Work) -> None:
+    """Fold laterals and low voltage, and measure what that changes."""
+    say("folding, and measuring what it changes")
+    folded = fold(work.feeder)
+    measured = measure(work.feeder, folded, rng=np.random.default_rng(_SEED))
+    work.feeder = folded.feeder
+    work.lines += ["", *folded_text(folded, measured)]
+    work.parts["reduction"] = folded_json(folded, measured)
+
+
+def _write(work: _Work, args: argparse.Namespace, imported: Imported) -> list[Path]:
+    """Write the feeder file, and its study where loads were measured."""
+    if args.output is None:
+        return []
+    folded = ", laterals and low voltage folded" if args.reduce else ""
+    dropped = f", without {', '.join(imported.dropped)}" if imported.dropped else ""
+    comment = f"Imported from {args.file.name} (OpenDSS){dropped}{folded}."
+    feeder = replace(work.feeder, imported_from=args.file.name)
+    written = list(write_feeder(feeder, args.output, comment=comment))
+    if work.study is not None:
+        study = args.output.with_suffix(".study.toml")
+        study.write_text(work.study, encoding="utf-8")
+        written.append(study)
+    return written
+
+
+def _write_report(path: Path, report: dict[str, Any], lines: Sequence[str]) -> None:
+    """Write the report as its suffix says."""
+    if path.suffix.lower() == ".json":
+        path.write_text(as_json(report), encoding="utf-8")
+        return
+    more = "\n".join(line if line else "" for line in lines)
+    path.write_text(
+        report_markdown(report) + (f"\n## Beside it\n{more}\n" if more else ""), encoding="utf-8"
+    )
+
+
+def _page(lines: Sequence[str]) -> str:
+    """Return the lines on a page that is as wide as all of them."""
+    wide = [part for line in lines for part in (wrapped(line) if len(line) > PAGE else [line])]
+    return "\n".join(wide) + "\n"
