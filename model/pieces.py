@@ -272,7 +272,6 @@ def span(feeder: Feeder, pieces: list[Piece]) -> Span:
             "must close over a line, a transformer or a regulator with `z_ohm`",
         )
     chords = sorted(forks)
-    # a fork may stand for the end that switches join with it, so the tail is the later one
     place = {name: k for k, name in enumerate(order)}
     tails = [max(pieces[n].ends, key=place.__getitem__) for n in chords]
     return Span(
