@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 
-from .parts import Feeder, InlineTransformer
+from .parts import Feeder, InlineTransformer, Line, Regulator, Switch
 
 __all__ = ["bus_neutrals"]
 
@@ -15,7 +15,12 @@ def bus_neutrals(feeder: Feeder) -> dict[str, bool]:
     A winding between phases has none, nor has a star that is not earthed.
     """
     joined: defaultdict[str, list[tuple[str, bool | None]]] = defaultdict(list)
-    for part in (*feeder.lines, *feeder.switches, *feeder.regulators):
+    joining: list[Line | Switch | Regulator] = [
+        *feeder.lines,
+        *feeder.switches,
+        *feeder.regulators,
+    ]
+    for part in joining:
         joined[part.from_bus].append((part.to_bus, None))
         joined[part.to_bus].append((part.from_bus, None))
     for unit in feeder.inline_transformers:

@@ -100,7 +100,10 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "downstream_kw": [far * level[0] * each[0], near * level[1] * each[1]],
         "downstream_kw_nominal": [far, near],
         "units": [unit.name for unit in units],
-        "yg_d": [unit.name for unit in (*units, *inline) if unit.connection == "Yg/D"],
+        "yg_d": [
+            *(unit.name for unit in units if unit.connection == "Yg/D"),
+            *(unit.name for unit in inline if unit.connection == "Yg/D"),
+        ],
         "yg_d_sampled": [unit.name for unit in units if unit.name in study.transformers.yg_d],
         # on three wires an unknown unit has no neutral to be Yg by
         "yg_d_unknown": [
