@@ -89,6 +89,7 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
     least, most = level_bounds(feeder, study).T
     units = [unit for unit in feeder.transformers if inside.holds(unit.place)]
     behind = {unit.name for unit in units}
+    inline = [unit for unit in feeder.inline_transformers if inside.joins(unit)]
 
     def hanging(parts: Iterable[Load | Der]) -> list[str]:
         return [p.name for p in parts if p.transformer in behind or inside.holds(p.place)]
@@ -103,9 +104,8 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "downstream_kw_nominal": [float(far.sum()), float(near.sum())],
         "units": [unit.name for unit in units],
         "yg_d": [
-            unit.name
-            for unit in (*units, *filter(inside.joins, feeder.inline_transformers))
-            if unit.connection == "Yg/D"
+            *(unit.name for unit in units if unit.connection == "Yg/D"),
+            *(unit.name for unit in inline if unit.connection == "Yg/D"),
         ],
         "yg_d_sampled": [unit.name for unit in units if unit.name in study.transformers.yg_d],
         # on three wires an unknown unit has no neutral to be Yg by
@@ -115,12 +115,8 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "loads": hanging(feeder.loads),
         "ders": hanging(feeder.ders),
         "capacitors": [bank.name for bank in feeder.capacitors if inside.holds(bank.place)],
-        "inline_transformers": [p.name for p in feeder.inline_transformers if inside.joins(p)],
-        "shifted_by": [
-            p.name
-            for p in feeder.inline_transformers
-            if inside.joins(p) and p.connection in SHIFTING
-        ],
+        "inline_transformers": [unit.name for unit in inline],
+        "shifted_by": [unit.name for unit in inline if unit.connection in SHIFTING],
         "regulators": [part.name for part in feeder.regulators if inside.joins(part)],
         "switches": [part.name for part in feeder.switches if part.closed and inside.joins(part)],
     }
