@@ -256,14 +256,14 @@ def span(feeder: Feeder, pieces: list[Piece]) -> Span:
     """
     order, parent_piece, left = _walk(feeder.source.bus, pieces, {})
     place = {name: k for k, name in enumerate(order)}
-    ends = {n: _sorted_ends(pieces[n], place) for n in left}
+    forks = {n: min(pieces[n].ends, key=place.__getitem__) for n in left}
     if any(pieces[n].is_bare for n in left):
         # Buses that closed switches join have one voltage: all stand for the first one reached,
         # and a loop of switches alone needs no chord.
         together = _joined(pieces)
         order, parent_piece, left = _walk(feeder.source.bus, pieces, together)
-        ends = _chord_ends(pieces, order, left, together)
-    bare = [pieces[n] for n in ends if pieces[n].is_bare]
+        forks = _forks(pieces, order, left, together)
+    bare = [pieces[n] for n in forks if pieces[n].is_bare]
     if bare:
         raise InputError.single(
             feeder.name,
@@ -271,13 +271,15 @@ def span(feeder: Feeder, pieces: list[Piece]) -> Span:
             "no impedance where the loop closes",
             "must close over a line, a transformer or a regulator with `z_ohm`",
         )
-    chords = sorted(ends)
+    chords = sorted(forks)
+    place = {name: k for k, name in enumerate(order)}
+    tails = [max(pieces[n].ends, key=place.__getitem__) for n in chords]
     return Span(
         order=order,
         parent_piece=parent_piece,
         chords=tuple(pieces[n] for n in chords),
-        forks=tuple(ends[n][0] for n in chords),
-        tails=tuple(ends[n][1] for n in chords),
+        forks=tuple(forks[n] for n in chords),
+        tails=tuple(tails),
     )
 
 
@@ -293,31 +295,22 @@ def _joined(pieces: list[Piece]) -> dict[str, list[str]]:
     return together
 
 
-def _sorted_ends(piece: Piece, place: dict[str, int]) -> tuple[str, str]:
-    """The end that was reached first, and the other."""
-    first, second = piece.ends
-    return (first, second) if place[first] <= place[second] else (second, first)
-
-
-def _chord_ends(
+def _forks(
     pieces: list[Piece],
     order: list[str],
     left: list[int],
     together: dict[str, list[str]],
-) -> dict[int, tuple[str, str]]:
-    """Fork and tail of every piece left over, but for switches that close a loop of switches.
-
-    The fork is the bus that stands for the end that was reached first.
-    """
+) -> dict[int, str]:
+    """The fork of every piece left over, but for switches that close a loop of switches."""
     place = {name: k for k, name in enumerate(order)}
-    found = {}
+    forks = {}
     for n in left:
-        upper, lower = _sorted_ends(pieces[n], place)
+        upper, lower = sorted(pieces[n].ends, key=place.__getitem__)
         group = together.get(upper, [upper])
         if pieces[n].is_switch and lower in group:
             continue
-        found[n] = (min(group, key=place.__getitem__), lower)
-    return found
+        forks[n] = min(group, key=place.__getitem__)
+    return forks
 
 
 def _other(piece: Piece, end: str) -> str:
