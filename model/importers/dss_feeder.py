@@ -25,7 +25,7 @@ from .dss_choices import (
 from .dss_lines import LineParts, line_parts
 from .dss_live import Node, live_nodes
 from .dss_loads import capacitor_of, der_of, loads_of
-from .dss_names import Names, letters
+from .dss_names import Names, clean, letters
 from .dss_neutrals import neutrals_of
 from .dss_records import RawCircuit, RawReactor
 from .dss_regulators import regulators_of, with_tap_changer
@@ -149,7 +149,7 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
     shunts = _shunts(build)
     raise_refusals(circuit, findings, source_name)
     feeder = Feeder(
-        name=circuit.name.replace("/", "_").replace("\\", "_"),
+        name=clean(circuit.name).translate({ord("/"): "_", ord("\\"): "_"}).strip(".") or "circuit",
         source=source,
         lines=tuple(build.built.lines),
         transformers=(),
