@@ -7,6 +7,7 @@ anywhere on an edge. Every closed loop has one edge that is its chord.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from .buses import bus_volts
 from .edges import hang_edges
 from .laws import law_rows, own_exponents
 from .machines import Machines, machines_of
+from .neutrals import bus_neutrals
 from .parts import Capacitor, Feeder, Load, Source
 from .phases import phase_mask
 from .pieces import ALL_PHASES, Piece, check_fed, detached_end, node_name, pieces_of, place_of, span
@@ -69,7 +71,8 @@ class Network:
     ratio_gang: NDArray[np.bool_]  #: (R,) they step together
     equipped: NDArray[np.bool_]  #: (edges,) something is connected below the edge
     emf_pu: float
-    three_wire: bool
+    three_wire: bool  #: at the source
+    neutral: NDArray[np.bool_]  #: (B,) a neutral goes with the lines there
 
     @property
     def chords(self) -> int:
@@ -174,7 +177,8 @@ def compile_network(
     index = {name: k for k, name in enumerate(order)}
     units = units_of(feeder, motors)
     edges = hang_edges(feeder, edge_pieces, spanned, _touched(feeder, units, order))
-    nodes = Nodes(row=index, volts=_node_volts(feeder, pieces, order))
+    buses = _buses_of(feeder, pieces, order)
+    nodes = Nodes(row=index, volts=_at_nodes(bus_volts(feeder), buses))
     machines = machines_of(feeder, units, motors)
     unit_node = np.array([index[node_name(feeder, place_of(u))] for u in units], np.int64)
     unit_part = unit_arrays(feeder, units, machines, nodes.volts[unit_node])
@@ -214,6 +218,7 @@ def compile_network(
         equipped=_equipped(tree),
         emf_pu=feeder.source.emf_pu,
         three_wire=feeder.source.wires == 3,
+        neutral=_at_nodes(bus_neutrals(feeder), buses).astype(np.bool_),
     )
 
 
@@ -235,15 +240,19 @@ def _neutral_y(source: Source) -> complex:
     return 0j if extreme else 1.0 / complex(source.neutral_ohm)
 
 
-def _node_volts(feeder: Feeder, pieces: list[Piece], order: list[str]) -> NDArray[np.float64]:
-    """Nominal volts of every node: a bus's own, and along a line those of its end."""
-    volts = bus_volts(feeder)
+def _buses_of(feeder: Feeder, pieces: list[Piece], order: list[str]) -> list[str]:
+    """The bus of every node, and along a line that of its from-end."""
     bus_of = {line.name: line.from_bus for line in feeder.lines}
+    own: dict[str, str] = {}
     for piece in pieces:
-        if piece.line is not None:
-            for end in piece.ends:
-                volts.setdefault(end, volts[bus_of[piece.line]])
-    return np.array([volts[name] for name in order])
+        for end in piece.ends:
+            own[end] = end if piece.line is None or ":" not in end else bus_of[piece.line]
+    return [own.get(name, name) for name in order]
+
+
+def _at_nodes(of_bus: Mapping[str, float], buses: list[str]) -> NDArray[np.float64]:
+    """(B,) what holds at the bus of each node."""
+    return np.array([of_bus[name] for name in buses], np.float64)
 
 
 def _equipped(tree: Tree) -> NDArray[np.bool_]:

@@ -272,7 +272,8 @@ def span(feeder: Feeder, pieces: list[Piece]) -> Span:
             "must close over a line, a transformer or a regulator with `z_ohm`",
         )
     chords = sorted(forks)
-    tails = [next(end for end in pieces[n].ends[::-1] if end != forks[n]) for n in chords]
+    place = {name: k for k, name in enumerate(order)}
+    tails = [max(pieces[n].ends, key=place.__getitem__) for n in chords]
     return Span(
         order=order,
         parent_piece=parent_piece,

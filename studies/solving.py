@@ -19,12 +19,14 @@ from ..model.network import Network, compile_network, locate
 from ..model.parts import Feeder
 from ..model.points import Points, find_points, into_line
 from ..model.reading.fields import did_you_mean
+from ..model.sides import edge_nodes
 from ..model.solve import solve, steady_state
-from ..model.solver.breaks import FLOATING, UNDEFINED
-from ..model.states import NOT_CONVERGED, Answer
+from ..model.solver.breaks import DEAD, FLOATING, UNDEFINED
+from ..model.states import NOT_CONVERGED, UNEARTHED, Answer
 from .loading import load_with_points
 from .run.store import as_json
 from .settings_file import read_settings
+from .show.solve_text import solve_text
 
 __all__ = ["Break", "parse_break", "solve_break", "solve_command"]
 
@@ -36,6 +38,7 @@ NOTHING_A = 1e-9  #: a change of current below it is rounding, and shows no impe
 DEFAULTS = Settings(i_set_a=1.0, v_set_pu=0.05, z_set_ohm=5.0)
 
 PHASES = "abc"
+FLAGS = {"dead": DEAD, "floating": FLOATING, "unearthed": UNEARTHED}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +58,9 @@ def solve_command(args: argparse.Namespace) -> int:
     broken, closed, settings = _read_all(args, feeder)
     print("solving; the solver is compiled at first use …", file=sys.stderr, flush=True)
     answer = solve_break(feeder, broken, closed, settings)
-    print(as_json(answer) if args.json else _table(feeder, broken, answer), end="")
+    phases = "".join(PHASES[a] for a in broken.phases)
+    title = f"{feeder.name}: phase {phases} open at {broken.fraction:g} of {broken.line}"
+    print(as_json(answer) if args.json else solve_text(title, answer), end="")
     return 0
 
 
@@ -103,8 +108,11 @@ def parse_break(text: str, feeder: Feeder) -> Break:
     if not 0.0 <= fraction <= 1.0:
         report.add(("fraction",), "must be a number in 0..1", fraction_text)
     letters = phases.lower()
+    there = next((item.phases for item in feeder.lines if item.name == line), PHASES)
     if not letters or len(set(letters)) != len(letters) or set(letters) - set(PHASES):
         report.add(("phases",), "must be one, two or three of a, b, c", phases)
+    elif set(letters) - set(there):
+        report.add(("phases",), f"must be of those that the line has: {', '.join(there)}", phases)
     report.raise_if_any()
     return Break(
         line=line, fraction=fraction, phases=tuple(sorted(PHASES.index(x) for x in letters))
@@ -149,35 +157,54 @@ def solve_break(
     lost = _lost_phases(broken, int(after.flags[0]))
     dark = network.below(edge)
     buses = {}
-    for name in sorted(_bus_names(feeder), key=network.nodes.index):
-        node = network.node(name)
+    at_tees = {piece.ends[1] for piece in network.pieces if piece and piece.stop < 1.0}
+    for node, name in enumerate(network.nodes):
+        if name in at_tees:
+            continue
+        absent = _absent(int(network.node_phases[node]))
         buses[name] = {
-            "before": _pairs(before.v[node, :, 0]),
-            "after": _pairs(after.v[node, :, 0], lost if dark[node] else ()),
+            "before": _pairs(before.v[node, :, 0], absent),
+            "after": _pairs(after.v[node, :, 0], (*absent, *(lost if dark[node] else ()))),
+            "v_nominal_v": float(network.node_v[node]),
         }
+    absent = _absent(int(network.tree.phases[edge]))
+    v_line = float(network.node_v[edge_nodes(network)[1][edge]])
     upper, lower = _stub_names(feeder, network, edge, broken)
     for n, name in ((0, upper), (1, lower)):
         buses[name] = {
-            "before": _pairs(before.stub[n, :, 0]),
-            "after": _pairs(after.stub[n, :, 0], lost if n else ()),
+            "before": _pairs(before.stub[n, :, 0], absent),
+            "after": _pairs(after.stub[n, :, 0], (*absent, *(lost if n else ()))),
+            "v_nominal_v": v_line,
         }
+    edges = _edges_by_line(network)
     lines = {
         line.name: {
-            "before": _line_currents(network, before, line.name),
-            "after": _line_currents(network, after, line.name),
+            "before": _line_currents(network, before, edges[line.name]),
+            "after": _line_currents(network, after, edges[line.name]),
         }
         for line in feeder.lines
     }
+    flags = int(before.flags[0] | after.flags[0])
     return {
         "buses": buses,
         "lines": lines,
+        "flags": [name for name, bit in FLAGS.items() if flags & bit],
         "sections": _sections(feeder, network, (before, after), settings),
     }
 
 
-def _bus_names(feeder: Feeder) -> set[str]:
-    ends = {end for line in feeder.lines for end in (line.from_bus, line.to_bus)}
-    return ends | {end for s in feeder.switches for end in (s.from_bus, s.to_bus)}
+def _absent(mask: int) -> tuple[int, ...]:
+    """Phases that a mask does not have."""
+    return tuple(phase for phase in range(3) if not mask >> phase & 1)
+
+
+def _edges_by_line(network: Network) -> dict[str, tuple[int, int]]:
+    """Each line's edges at its from-end and at its to-end."""
+    found: dict[str, list[tuple[float, int]]] = {}
+    for k, piece in enumerate(network.pieces):
+        if piece is not None and piece.line is not None:
+            found.setdefault(piece.line, []).append((piece.start, k))
+    return {line: (min(own)[1], max(own)[1]) for line, own in found.items()}
 
 
 def _lost_phases(broken: Break, flags: int) -> tuple[int, ...]:
@@ -203,16 +230,16 @@ def _pairs(abc: Complex, lost: tuple[int, ...] = ()) -> list[list[float] | None]
     return [None if phase in lost else _pair(value) for phase, value in enumerate(abc)]
 
 
-def _line_currents(network: Network, answer: Answer, line: str) -> dict[str, Any]:
-    """Amperes into a line at both ends."""
-    edges = network.edges_of(line)
-    first, last = edges[0], edges[-1]
+def _line_currents(network: Network, answer: Answer, ends: tuple[int, int]) -> dict[str, Any]:
+    """Amperes into a line at both ends, whose edges are given."""
+    first, last = ends
+    absent = _absent(int(network.tree.phases[first]))
     # probes: edge k's upper end at 2k, its lower end at 2k + 1, both positive downwards
     start = answer.i[2 * first + (0 if network.upward[first] else 1), :, 0]
     stop = answer.i[2 * last + (1 if network.upward[last] else 0), :, 0]
     return {
-        "from_end": _pairs(start if network.upward[first] else -start),
-        "to_end": _pairs(-stop if network.upward[last] else stop),
+        "from_end": _pairs(start if network.upward[first] else -start, absent),
+        "to_end": _pairs(-stop if network.upward[last] else stop, absent),
     }
 
 
@@ -279,61 +306,3 @@ def _judged(seen: Evidence, own: Settings | None) -> tuple[bool, str]:
         return False, reason.text
     idle = reach_of(seen, own.options).di_a[0, 0, 0] < own.i_set_a
     return True, "trip: a phase, |ΔI1| being below I_set" if idle else reason.text
-
-
-def _table(feeder: Feeder, broken: Break, answer: dict[str, Any]) -> str:
-    """The answer for people, in 100 columns where names are short."""
-    phases = "".join(PHASES[a] for a in broken.phases)
-    scale = 100 / feeder.source.v_phase_v
-    wide = max(9, *(len(name) for name in answer["buses"])) + 2
-    lines = [
-        f"{feeder.name}: phase {phases} open at {broken.fraction:g} of {broken.line}",
-        "",
-        f"{'bus':<{wide}}{'|V| before, %':^27}  {'|V| after, %':^27}  {'|change|, %':^27}",
-    ]
-    for name, bus in answer["buses"].items():
-        change = [
-            None if b is None or a is None else [a[0] - b[0], a[1] - b[1]]
-            for b, a in zip(bus["before"], bus["after"], strict=True)
-        ]
-        parts = (bus["before"], bus["after"], change)
-        lines.append(f"{name:<{wide}}" + "  ".join(_sizes(part, scale) for part in parts))
-    lines.append("in % of nominal, phases a, b, c; –: connected to nothing, or to no earth")
-    if answer["sections"]:
-        lines += ["", *_terminal_rows(answer["sections"])]
-    return "\n".join(lines) + "\n"
-
-
-def _terminal_rows(sections: list[dict[str, Any]]) -> list[str]:
-    """What each terminal sees: in positive sequence, then in phases."""
-    names = [f"{row['local']}→{row['remote']}" for row in sections]
-    wide = max(8, *(len(name) for name in names)) + 2
-    lines = [
-        f"{'terminal':<{wide}}{'|ΔI1| A':>9}{'|ΔI1*| A':>10}{'|ΔV1| %':>9}{'Z1 Ω':>19}  verdict"
-    ]
-    lines += [
-        f"{name:<{wide}}{row['di1_a']:>9.4f}{row['di1_star_a']:>10.4f}"
-        f"{row['dv1_pu'] * 100:>9.3f}{_polar(row['z1_ohm']):>19}  {row['reason']}"
-        for name, row in zip(names, sections, strict=True)
-    ]
-    lines += ["", f"{'terminal':<{wide}}{'|ΔI| a, b, c, A':^27}  {'|Z| a, b, c, Ω':^33}"]
-    for name, row in zip(names, sections, strict=True):
-        currents = "".join(f"{value:>9.4f}" for value in row["di_abc_a"])
-        impedances = "".join(
-            f"{'undefined':>11}" if z is None else f"{abs(complex(*z)):>11.3f}"
-            for z in row["zabc_ohm"]
-        )
-        lines.append(f"{name:<{wide}}{currents}  {impedances}")
-    return lines
-
-
-def _sizes(values: list[list[float] | None], scale: float) -> str:
-    texts = ["–" if v is None else f"{abs(complex(*v)) * scale:.3f}" for v in values]
-    return "".join(f"{text:>9}" for text in texts)
-
-
-def _polar(value: list[float] | None) -> str:
-    if value is None:
-        return "undefined"
-    z = complex(*value)
-    return f"{abs(z):.4f}∠{np.degrees(np.angle(z)):.1f}°"

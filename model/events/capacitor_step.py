@@ -25,13 +25,13 @@ def draw_capacitor_step(
 ) -> Event:
     """A balanced bank of ``kvar``, on or off as likely; every region as likely.
 
-    It is a delta with probability ``delta_share``, and always on three wires; a grounded wye
+    It is a delta with probability ``delta_share``, and always without a neutral; a grounded wye
     otherwise. ``regions`` are of three-phase lines.
     """
     edge, share = draw_place(rng, size, regions)
     each = np.tile(-1j * kvar.draw(rng, size) * 1000.0 / 3.0, (3, 1))
-    delta = (rng.random(size) < delta_share) | network.three_wire
     spot = spot_on(network, edge)
+    delta = (rng.random(size) < delta_share) | spot.between
     bank = where(delta, between_phases(spot, each), to_earth(spot, each))
     before, after = each_way(rng, bank)
     return put(replace(no_event(network, size), edge=edge, share=share), before, after)

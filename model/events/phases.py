@@ -8,7 +8,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["THREE_PHASES", "count_phases", "draw_mask", "draw_pair", "draw_phase", "row_flags"]
+__all__ = [
+    "THREE_PHASES",
+    "count_phases",
+    "draw_mask",
+    "draw_pair",
+    "draw_phase",
+    "draw_row",
+    "row_flags",
+]
 
 Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
@@ -41,23 +49,26 @@ def count_phases(there: Int) -> Int:
 
 def draw_phase(rng: np.random.Generator, there: Int) -> Int:
     """(S,) rows 0 to 2: one phase of each mask (S,), each as likely."""
-    rank = rng.integers(3, size=there.size)
-    count = _COUNT[there]
-    if (count == 2).any():  # of two phases, the third rank is drawn again
-        rank = np.where((count == 2) & (rank == 2), rng.integers(2, size=there.size), rank)
-    return _OF_RANK[there, rank]
+    return draw_row(rng, there, np.zeros(there.size, np.bool_))
 
 
 def draw_pair(rng: np.random.Generator, there: Int) -> Int:
     """(S,) pairs 0 to 2 of the phases of each mask (S,), each as likely.
 
-    A mask of one phase has none: its place is that of the phase, so that whoever asks for it
-    all the same can tell which it is.
+    Of a mask of one phase there is none, and the row is without meaning.
     """
-    any_of_three = rng.integers(3, size=there.size)
+    return draw_row(rng, there, np.ones(there.size, np.bool_))
+
+
+def draw_row(rng: np.random.Generator, there: Int, pairs: Bool) -> Int:
+    """(S,) rows 0 to 2: pairs of each mask (S,) where ``pairs`` says so, phases elsewhere."""
+    rank = rng.integers(3, size=there.size)
     count = _COUNT[there]
-    one = np.where(count == 1, _OF_RANK[there, 0], _PAIR[there])
-    return np.where(count == 3, any_of_three, one)
+    pair = np.where(count == 3, rank, _PAIR[there])
+    two = (count == 2) & ~pairs
+    if two.any():  # of two phases, the third rank is drawn again
+        rank = np.where(two & (rank == 2), rng.integers(2, size=there.size), rank)
+    return np.where(pairs, pair, _OF_RANK[there, rank])
 
 
 def draw_mask(rng: np.random.Generator, there: Int, two_phase_share: float) -> Int:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..network import Network
 from .base import Event
-from .phases import THREE_PHASES, count_phases, draw_pair, draw_phase, row_flags
+from .phases import THREE_PHASES, count_phases, draw_row, row_flags
 
 __all__ = [
     "LEAST_OHM",
@@ -42,15 +42,15 @@ class Spot:
 
     phases: Int  #: (S,) masks of the phases
     v_nominal_v: Real  #: (S,) phase to earth
-    three_wire: bool
+    neutral: Bool  #: (S,) there is one
 
     @property
     def between(self) -> Bool:
-        """(S,) loads lie between phases: there is no neutral, and a second phase.
+        """(S,) loads lie between phases: there is no neutral, but a second phase.
 
         One conductor alone returns through the earth, whatever feeds it.
         """
-        return np.asarray(self.three_wire & (count_phases(self.phases) > 1))
+        return np.asarray(~self.neutral & (count_phases(self.phases) > 1))
 
 
 def spot_on(network: Network, edge: Int) -> Spot:
@@ -60,7 +60,7 @@ def spot_on(network: Network, edge: Int) -> Spot:
     return Spot(
         phases=network.tree.phases[edge],
         v_nominal_v=network.node_v[lower],
-        three_wire=network.three_wire,
+        neutral=network.neutral[lower],
     )
 
 
@@ -69,7 +69,7 @@ def spot_at(network: Network, node: Int) -> Spot:
     return Spot(
         phases=network.node_phases[node],
         v_nominal_v=network.node_v[node],
-        three_wire=network.three_wire,
+        neutral=network.neutral[node],
     )
 
 
@@ -148,7 +148,6 @@ def phase_shares(rng: np.random.Generator, spot: Spot, single_phase_share: float
     Where there are fewer than three phases, it is on one always. Rows are phases, or pairs of
     them where ``spot.between``.
     """
-    pairs = draw_pair if spot.three_wire else draw_phase
-    alone = row_flags(pairs(rng, spot.phases))
+    alone = row_flags(draw_row(rng, spot.phases, spot.between))
     single = rng.random(spot.phases.size) < single_phase_share
     return np.where(single | (spot.phases != THREE_PHASES), alone, 1.0 / 3.0)

@@ -17,8 +17,8 @@ STATED = (
     "the source and of each load, whatever the event.",
     "Events pick a region first, every one equally likely, then a place uniform in length: a "
     "section, or what lies alike to all sections; for breaks a section's path and its laterals are "
-    "two regions. They stand on lines of medium voltage, take phases that are there, and scale with the nominal "
-    "voltage of their place.",
+    "two regions. They stand on lines of medium voltage, take phases that are there, and scale "
+    "with the nominal voltage of their place.",
     "Where the study draws their exponents, loads are constant impedance below 0.7 pu; else each "
     "follows its own law.",
     "Random errors are complex, per phase, channel and frame: normal with a standard deviation of "

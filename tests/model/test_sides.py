@@ -15,6 +15,7 @@ from openphase.model.network import compile_network
 from openphase.model.parts import Feeder, Line, Load, Place, Point, Section, Source, Switch
 from openphase.model.points import Terminal, find_points
 from openphase.model.sides import Side
+from openphase.model.solve import solve, steady_state
 
 SOURCE = Source(
     bus="0", kv_ll=12.0, emf_pu=1.0, z1_ohm=0.9j, z2_ohm=0.9j, z0_ohm=0.9j, frequency_hz=60.0
@@ -171,3 +172,25 @@ def test_ten_terminals_on_three_thousand_buses_take_seconds(loops: int) -> None:
     found = find_points(own, network)
     assert len(found.terminals) == 10
     assert time.perf_counter() - begun < 2.0
+
+
+@pytest.mark.parametrize("ends", [(1, 2), (2, 1)])
+def test_a_line_back_to_a_bus_that_a_switch_joins_closes_the_loop(ends: tuple[int, int]) -> None:
+    """Two lines from 0 to 1, one of them over a switch, carry a load as one of half the length."""
+    load = Load(
+        name="load",
+        transformer=None,
+        place=Place(bus="1"),
+        connection="wye",
+        kw=3000.0,
+        power_factor=0.9,
+        exponent=2.0,
+    )
+    double = replace(feeder_of([(0, 1), ends], [(0, 2)]), loads=(load,))
+    plain = replace(feeder_of([(0, 1)], []), loads=(load,))
+    half = replace(plain, lines=(replace(plain.lines[0], length_km=0.5),))
+    v = []
+    for own in (double, half):
+        network = compile_network(own)
+        v.append(solve(network, steady_state(network)).v[network.node("1"), :, 0])
+    np.testing.assert_allclose(v[0], v[1], rtol=1e-12)

@@ -9,12 +9,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from openphase.model.events.phases import count_phases
+from openphase.model.events.shunts import spot_on
+from openphase.model.network import compile_network
 from openphase.model.parts import (
     Capacitor,
     Feeder,
@@ -273,3 +276,27 @@ def test_sides_of_equipment_behind_transformers() -> None:
     assert sides["beyond"] == (Side.DOWNSTREAM, Side.PATH)
     assert sides["stepped down"] == (Side.DOWNSTREAM, Side.UPSTREAM)
     assert sides["low"] == (Side.DOWNSTREAM, Side.DOWNSTREAM)
+
+
+def test_behind_a_delta_loads_lie_between_phases() -> None:
+    """The feeder of a substation transformer without a neutral on this side."""
+    feeder = mixed()
+    units = tuple(
+        replace(unit, connection="D/D") if unit.name == "T69" else unit
+        for unit in feeder.inline_transformers
+    )
+    loads = tuple(
+        replace(own, connection="delta") if own.name == "at D" else own for own in feeder.loads
+    )
+    delta = replace(feeder, inline_transformers=units, loads=loads, capacitors=())
+    network = compile_network(delta)
+    lines = {"trunk", "beyond", "lateral a", "lateral bc"}
+    neutral = {
+        str(piece.line): bool(network.neutral[k])
+        for k, piece in enumerate(network.pieces[: len(network.nodes)])
+        if piece is not None and piece.line is not None
+    }
+    assert neutral == {name: name in ("stepped down", "low") for name in LINES}
+    edge = np.array([k for k, p in enumerate(network.pieces) if p is not None and p.line in lines])
+    spot = spot_on(network, edge)
+    np.testing.assert_array_equal(spot.between, count_phases(spot.phases) > 1)

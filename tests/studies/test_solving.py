@@ -24,7 +24,7 @@ from openphase.studies.run import engine
 from openphase.studies.run.classes import DrawClass, Purpose
 from openphase.studies.run.draw import BlockId, draw_scenarios, make_case
 from openphase.studies.settings_file import read_settings
-from openphase.studies.solving import parse_break, solve_break
+from openphase.studies.solving import Break, parse_break, solve_break
 from openphase.studies.spec.study_file import default_study
 
 V_NOMINAL = 12_000 / 3**0.5
@@ -187,7 +187,7 @@ def test_a_conductor_connected_to_nothing_has_no_voltage() -> None:
 def test_json_is_one_object_on_stdout(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["solve", "paper", "--open", "R2-R3:0.6:a", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
-    assert list(answer) == ["buses", "lines", "sections"]
+    assert list(answer) == ["buses", "lines", "flags", "sections"]
     assert list(answer["sections"][0]) == [
         "local", "remote", "di1_a", "di1_star_a", "dv1_pu", "z1_ohm", "zabc_ohm", "di_abc_a",
         "trip", "reason",
@@ -320,3 +320,30 @@ def test_a_break_at_a_tee_leaves_the_tee_beyond_it() -> None:
     at, before, behind = z1(0.25), z1(0.2499999), z1(0.2500001)
     assert at == pytest.approx(before, rel=1e-5)
     assert abs(at - behind) > 50  # T2 carries half of the load beyond R2
+
+
+def test_phases_that_are_not_there_are_null_and_volts_are_of_their_own_bus() -> None:
+    feeder = load_feeder("ieee34")
+    found = solve_break(feeder, Break(line="l7", fraction=0.5, phases=(0,)), closed_of(feeder))
+    assert found["buses"]["810"]["before"][0] is None
+    assert found["buses"]["810"]["before"][1] is not None
+    assert found["buses"]["890"]["v_nominal_v"] == pytest.approx(4160.0 / 3.0**0.5)
+    assert found["buses"]["l7.p"]["v_nominal_v"] == pytest.approx(24900.0 / 3.0**0.5)
+    for bus in found["buses"].values():
+        for value in filter(None, bus["before"]):
+            assert 0.9 < abs(complex(*value)) / bus["v_nominal_v"] < 1.1
+    lateral = next(line for line in feeder.lines if len(line.phases) == 1)
+    currents = found["lines"][lateral.name]["before"]["from_end"]
+    assert [value is not None for value in currents] == [a in lateral.phases for a in "abc"]
+
+
+def test_a_break_of_a_phase_that_the_line_does_not_have_is_refused() -> None:
+    feeder = load_feeder("ieee34")
+    lateral = next(line for line in feeder.lines if line.phases == "b")
+    with pytest.raises(InputError, match="must be of those that the line has: b, got"):
+        parse_break(f"{lateral.name}:0.5:a", feeder)
+    assert parse_break(f"{lateral.name}:0.5:b", feeder).phases == (1,)
+
+
+def closed_of(feeder: Feeder) -> frozenset[str]:
+    return frozenset(switch.name for switch in feeder.switches if switch.closed)

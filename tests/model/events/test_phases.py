@@ -24,7 +24,9 @@ def phases_of(mask: int) -> set[int]:
 
 
 def spot(mask: int, three_wire: bool, v: float = 2400.0) -> Spot:
-    return Spot(phases=np.full(N, mask), v_nominal_v=np.full(N, v), three_wire=three_wire)
+    return Spot(
+        phases=np.full(N, mask), v_nominal_v=np.full(N, v), neutral=np.full(N, not three_wire)
+    )
 
 
 @pytest.mark.parametrize("mask", MASKS)

@@ -1,0 +1,46 @@
+"""Where a neutral goes with the lines, so that loads may lie between a phase and it."""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+
+from .parts import Feeder, InlineTransformer, Line, Regulator, Switch
+
+__all__ = ["bus_neutrals"]
+
+
+def bus_neutrals(feeder: Feeder) -> dict[str, bool]:
+    """Whether each bus has a neutral: of the source, or of the winding that feeds it.
+
+    A winding between phases has none, nor has a star that is not earthed.
+    """
+    joined: defaultdict[str, list[tuple[str, bool | None]]] = defaultdict(list)
+    joining: list[Line | Switch | Regulator] = [
+        *feeder.lines,
+        *feeder.switches,
+        *feeder.regulators,
+    ]
+    for part in joining:
+        joined[part.from_bus].append((part.to_bus, None))
+        joined[part.to_bus].append((part.from_bus, None))
+    for unit in feeder.inline_transformers:
+        joined[unit.from_bus].append((unit.to_bus, _earthed(unit, to_side=True)))
+        joined[unit.to_bus].append((unit.from_bus, _earthed(unit, to_side=False)))
+    found = {feeder.source.bus: feeder.source.wires == 4}
+    waiting = deque([feeder.source.bus])
+    while waiting:
+        bus = waiting.popleft()
+        for far, makes in joined[bus]:
+            if far not in found:
+                found[far] = found[bus] if makes is None else makes
+                waiting.append(far)
+    return found
+
+
+def _earthed(unit: InlineTransformer, *, to_side: bool) -> bool:
+    """Whether that winding has an earthed neutral, or, a single one, lies to earth."""
+    if unit.connection == "centre-tap":
+        return to_side or len(unit.phases) == 1
+    if unit.connection == "single":
+        return len(unit.to_phases if to_side else unit.phases) == 1
+    return unit.connection.split("/")[to_side] == "Yg"
