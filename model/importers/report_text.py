@@ -83,9 +83,7 @@ def _sentences(report: dict[str, Any]) -> list[str]:
         f"buses by kV: {_counts(total['buses_by_kv'])}",
     ]
     for name, taps in total["regulators"].items():
-        found.append(
-            f"regulator {name} at taps {taps[0]}, {taps[1]}, {taps[2]}, as the file has it"
-        )
+        found.append(f"regulator {name} at taps {taps[0]}, {taps[1]}, {taps[2]}")
     found += [_group(row) for row in report["how"]]
     if report["disabled"]:
         found.append(f"{report['disabled']} elements are disabled in the file: not there")
