@@ -88,6 +88,13 @@ def hang_edges(feeder: Feeder, pieces: list[Piece | None], spanned: Span, touche
             "chord_y_s": np.array(
                 [_chord_admittance(pieces[k], z[k], bool(upward[k])) for k in chord_edges], z.dtype
             ).reshape(-1, 3, 3),
+            "passed": np.full(count, -1, np.int64),
+            "leap": np.full(count, -1, np.int64),
+            "twigs": 0,
+            "leap_from": np.zeros(0, np.int64),
+            "leap_z_ohm": np.zeros((0, 3, 3), z.dtype),
+            "leap_up_s": np.zeros((0, 3, 3), z.dtype),
+            "leap_low_s": np.zeros((0, 3, 3), z.dtype),
             "alone": np.eye(chords, dtype=np.bool_),
         },
         upward=upward,

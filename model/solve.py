@@ -122,6 +122,8 @@ def solve(
     """
     _check(network, state)
     probes = probes or all_probes(network)
+    if np.any(network.tree.passed[probes.v_node] >= 0):
+        raise ValueError("probes look at a node that a leap passes by")
     answer = new_answer(network, probes, state.emf_pu.size)
     work = workspace(network.tree)
     answer.winding_v_pu[:] = 1.0 if start is None else start

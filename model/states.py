@@ -67,6 +67,13 @@ class Tree(NamedTuple):
     tail: Int  #: (C,)
     chord_y_s: Complex  #: (C, 3, 3) inverse of the chord's impedance, in the phases it has
     alone: NDArray[np.bool_]  #: (C, C) the identity: each chord by itself
+    passed: Int  #: (B,) the leap that passes this node by; -1: none
+    leap: Int  #: (B,) the leap that ends at this node; -1: none
+    twigs: int  #: the first leaps, which end nowhere: nothing hangs on what they pass by
+    leap_from: Int  #: (Q,) node above each leap
+    leap_z_ohm: Complex  #: (Q, 3, 3) over all the edges of a leap
+    leap_up_s: Complex  #: (Q, 3, 3) at its upper end, beside what that node has
+    leap_low_s: Complex  #: (Q, 3, 3) and at its lower end
     shunt_s: Complex  #: (B, 3, 3) fixed shunts on each node: capacitors, charging, windings
     unit_node: Int  #: (U,)
     unit_v: Real  #: (U,) nominal volts, phase to earth

@@ -19,11 +19,14 @@ from ..model.points import Terminal, find_points
 from ..model.reading.provenance import assumptions, count_origins
 from ..model.sides import Side
 from .loading import load_with_points
+from .run.load_levels import level_bounds
 from .run.store import as_json
 from .show.check_text import check_text
-from .spec.study_file import Study, check_study, default_study
+from .spec.study_file import Study, check_study, default_study, own_study_file
 
 __all__ = ["check_command", "summary"]
+
+Real = NDArray[np.float64]
 
 SHIFTING = ("D/Yg", "D/Y", "Yg/D", "Y/D")  #: the phasors of either side stand 30 degrees apart
 
@@ -32,7 +35,7 @@ def check_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code. Faults of the file have ended it before."""
     feeder, chosen = load_with_points(args.feeder)
     study = default_study(args.feeder)
-    check_study(study, feeder, "study.toml")
+    check_study(study, feeder, str(own_study_file(args.feeder) or "study.toml"))
     found = summary(feeder, study, chosen)
     if args.plot:
         _plot(feeder, args.plot)
@@ -69,7 +72,7 @@ def summary(feeder: Feeder, study: Study, chosen: tuple[str, ...] = ()) -> dict[
             for t in feeder.inline_transformers
         ],
         "values": count_origins(feeder),
-        "assumed": [*_assumed(feeder), *assumptions(feeder)],
+        "assumed": [*_assumed(feeder), *_measured(study), *assumptions(feeder)],
     }
     if feeder.sections:
         points = find_points(feeder, network)
@@ -83,7 +86,7 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
     inside = _inside(feeder, network, terminal)
     near = _kw_below(feeder, network, terminal, nearest=True)
     far = _kw_below(feeder, network, terminal, nearest=False)
-    level, each = study.loads.level.support, study.loads.each.support
+    least, most = level_bounds(feeder, study).T
     units = [unit for unit in feeder.transformers if inside.holds(unit.place)]
     behind = {unit.name for unit in units}
     inline = [unit for unit in feeder.inline_transformers if inside.joins(unit)]
@@ -97,8 +100,8 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
         "length_km": float(network.length_km[terminal.on_path].sum()),
         "line_z1_ohm": [terminal.line_z1_ohm.real, terminal.line_z1_ohm.imag],
         "laterals_km_by_phases": _km_by_phases(network, terminal.in_section & ~terminal.on_path),
-        "downstream_kw": [far * level[0] * each[0], near * level[1] * each[1]],
-        "downstream_kw_nominal": [far, near],
+        "downstream_kw": [float(far @ least), float(near @ most)],
+        "downstream_kw_nominal": [float(far.sum()), float(near.sum())],
         "units": [unit.name for unit in units],
         "yg_d": [
             *(unit.name for unit in units if unit.connection == "Yg/D"),
@@ -169,8 +172,8 @@ def _km_by_phases(network: Network, chosen: NDArray[np.bool_]) -> list[float]:
     return [float(network.length_km[chosen & (count == n)].sum()) for n in (1, 2, 3)]
 
 
-def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: bool) -> float:
-    """Nominal kW of load beyond the section's first edge, or beyond its last.
+def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: bool) -> Real:
+    """(L,) nominal kW of each load beyond the section's first edge, or beyond its last; else 0.
 
     Where loops are closed, that which the source reaches over the section alone.
     """
@@ -180,7 +183,7 @@ def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: 
         below = terminal.node_side == Side.DOWNSTREAM
         below |= nearest & (terminal.node_side == Side.LATERAL)
     loaded = below[network.load_node]
-    return float(sum(load.kw for load, own in zip(feeder.loads, loaded, strict=True) if own))
+    return np.where(loaded, np.array([load.kw for load in feeder.loads]), 0.0)
 
 
 def _assumed(feeder: Feeder) -> list[str]:
@@ -198,6 +201,15 @@ def _assumed(feeder: Feeder) -> list[str]:
     if any(li.code is None and li.z0_ohm_per_km == li.z1_ohm_per_km for li in feeder.lines):
         said.append("some lines have z0 = z1 (given so): overhead lines have z0 ≈ 3 z1")
     return said
+
+
+def _measured(study: Study) -> list[str]:
+    """Where load was measured, and how far down it goes there."""
+    levels = [
+        f"{item.point} {item.level.support[0]:.3g} to {item.level.support[1]:.3g}"
+        for item in study.measured
+    ]
+    return [f"level of the loads by what was measured at {', '.join(levels)}"] if levels else []
 
 
 def _plot(feeder: Feeder, path: Path) -> None:

@@ -87,8 +87,8 @@ def _difference(imported: Imported, mode: str, solved: Volts) -> Difference:
         phases = [p for p in nodes if int(network.node_phases[k]) >> p & 1]
         if phases:
             nominal = float(network.node_v[k])
-            ours = np.array([answer.v[k, p, 0] for p in phases]) / nominal
-            wanted = np.array([nodes[p] for p in phases]) / nominal
+            ours = np.array([answer.v[k, p, 0] for p in phases], np.complex128) / nominal
+            wanted = np.array([nodes[p] for p in phases], np.complex128) / nominal
             rows.append(_Bus(bus, phases, ours, wanted, bus in floating))
     worst = max(rows, key=_largest, default=None)
     levels = np.abs(np.concatenate([row.ours for row in rows])) if rows else np.zeros(1)

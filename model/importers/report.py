@@ -66,9 +66,7 @@ def _groups(rows: Sequence[Finding]) -> list[dict[str, Any]]:
     for row in rows:
         if row.fate != "as it is" or row.how:
             groups[(row.fate, row.kind, row.how)].append(row)
-    order = sorted(
-        groups, key=lambda key: (_FATES[1:].index(key[0]) if key[0] in _FATES[1:] else 9, key)
-    )  # type: ignore[arg-type]
+    order = sorted(groups, key=lambda key: (key[0] == "as it is", key))
     return [
         {
             "class": kind,

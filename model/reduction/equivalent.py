@@ -83,7 +83,7 @@ class Equivalent:
 class SeenLoad:
     """A load that is folded: (branches, 3) voltages of its branches per voltage at the root."""
 
-    y_s: complex  #: of a branch, at level 1
+    y_s: Complex  #: (branches,) at level 1
     gain: Complex  #: at the level of the fold
     bare_gain: Complex  #: without loads
 
@@ -233,11 +233,17 @@ def _loaded(
     """(3, 3) admittance of all loads at the equivalent's bus, or the sum of their ``measure``."""
     total = np.zeros((3, 3), np.complex128)
     for fit, load in zip(fits, loads, strict=True):
-        total += measure(level * fit.share * load.y_s) * _SHAPE[fit.phases, fit.connection]
+        branches = across(fit.phases, fit.connection)
+        values = [measure(level * fit.share * y) for y in _of_branches(load, branches)]
+        total += branches.T @ np.diag(values) @ branches
     return total
 
 
-_SHAPE = {(phases, connection): shape for phases, connection, shape in SHAPES}
+def _of_branches(load: SeenLoad, branches: NDArray[np.float64]) -> Complex:
+    """Admittances of a load in other branches: of those most like them, if they are as many."""
+    if len(branches) != load.y_s.size or load.y_s.size == 1:
+        return np.full(len(branches), load.y_s.mean())
+    return np.asarray(load.y_s[np.abs(branches @ load.bare_gain.T).argmax(axis=1)])
 
 
 def _basis(loads: Complex) -> NDArray[np.float64]:
@@ -283,4 +289,4 @@ def _of_units(basis: NDArray[np.float64], z: Complex, loads: Complex, paired: bo
 def _passive(z: Complex, loads: Complex) -> Complex:
     """No negative resistance, and some reactance."""
     least = LEAST_Z / float(np.abs(loads).max())
-    return np.maximum(z.real, 0.0) + 1j * np.maximum(z.imag, least)
+    return np.maximum(z.real, 0.0) + 1j * np.where(z.imag > 0.0, z.imag, least)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..buses import bus_volts
 from ..parts import Feeder, InlineTransformer, Line, Load
-from ..solver.assemble import law_factors
 from .choose import ENDS, Choice, SeenRoot, best_equivalent
 from .equivalent import Equivalent, Kind, SeenLoad, gain_through
 from .foldable import fold_roots, kept_by_default
@@ -143,7 +142,7 @@ def _seen_roots(
             bare_s=bare.y_s[n],
             ends_s=[y[n] for y in ends],
             loads=[
-                SeenLoad(y_s=_mean_y(state, k), gain=state.gain[k], bare_gain=bare.gain[k])
+                SeenLoad(y_s=state.branch_y_s[k], gain=state.gain[k], bare_gain=bare.gain[k])
                 for k in rows
             ],
         )
@@ -162,17 +161,12 @@ def _rows_of_loads(part: FoldedPart) -> list[list[NDArray[np.int64]]]:
 
 def _was_at(part: FoldedPart, state: Seen, rows: NDArray[np.int64]) -> WasAt:
     """A load's branches on average; they are equal but for their voltages."""
-    v, nominal_v = float(np.abs(state.branch_v[rows]).mean()), float(part.branch_v[rows[0]])
     return WasAt(
-        y_s=_mean_y(state, rows),
-        factors=law_factors(part.laws, int(part.branch_load[rows[0]]), v / nominal_v),
-        v=v,
-        nominal_v=nominal_v,
+        y_s=complex(state.branch_y_s[rows].mean()),
+        nominal_y_s=complex(part.branch_y_s[rows[0]]),
+        v=float(np.abs(state.branch_v[rows]).mean()),
+        nominal_v=float(part.branch_v[rows[0]]),
     )
-
-
-def _mean_y(state: Seen, rows: NDArray[np.int64]) -> complex:
-    return complex(state.branch_y_s[rows].mean())
 
 
 def _km(

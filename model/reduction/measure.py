@@ -107,8 +107,8 @@ def measure(
     return Measured(
         scenarios=scenarios,
         voltage_pu=_spread(gaps[:, :, converged].ravel()),
-        z_op=_spread((np.abs(z_folded - z) / np.abs(z))[usable]),
-        di1=_spread((np.abs(di1_folded - di1) / np.abs(di1))[usable]),
+        z_op=_spread(np.abs((z_folded - z)[usable]) / np.abs(z[usable])),
+        di1=_spread(np.abs((di1_folded - di1)[usable]) / np.abs(di1[usable])),
         not_converged=int((~converged).sum()),
         undefined=int((converged & ~usable).sum()),
         per_s=(found[0].per_s, found[1].per_s),

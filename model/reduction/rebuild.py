@@ -34,7 +34,7 @@ class WasAt:
     """Where a load stood: what its branches were, at the level of the fold."""
 
     y_s: complex  #: of a branch, at its voltage
-    factors: tuple[float, float]  #: conductance and susceptance there, over the nominal ones
+    nominal_y_s: complex
     v: float  #: of a branch
     nominal_v: float
 
@@ -57,8 +57,13 @@ def moved_load(load: Load, bus: str, how: tuple[Fit, bool], was: WasAt, v: Compl
     # its own law meets the same voltage in pu as before
     kv = was.nominal_v * float(np.abs(here @ v).mean()) / was.v / 1000.0
     y = fit.share * was.y_s
-    p_factor, q_factor = was.factors
-    kva = complex(y.real / p_factor, -y.imag / q_factor) * kv**2 * 1000.0 * len(here)
+    g, b = y.real, y.imag
+    # what its law makes of it there, it will make of it here
+    if was.y_s.real != 0.0:
+        g *= was.nominal_y_s.real / was.y_s.real
+    if was.y_s.imag != 0.0:
+        b *= was.nominal_y_s.imag / was.y_s.imag
+    kva = complex(g, -b) * kv**2 * 1000.0 * len(here)
     return replace(
         load,
         place=Place(bus=bus),

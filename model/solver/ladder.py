@@ -73,11 +73,24 @@ def climb(tree: Tree, state: State, work: Work, s: int) -> int:
     """
     parents, in_loop, lone, z_all = tree.parent, tree.in_loop, tree.lone_phase, tree.z_ohm
     y_all, y_j, f_all, w_all, x_j = work.y, work.y_j, work.f, work.w, work.x_j
+    passed, leaps = tree.passed, tree.leap
     edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
     last, chords = parents.size, tree.tail.size
     sourced = tree.machine_unit.size > 0
     flags = 0
+    needed, needed_too = leaps_to_take_apart(tree, edge, state.far_node[s])
+    for q in range(tree.twigs):
+        if q != needed and q != needed_too:
+            k = tree.leap_from[q]
+            store(y_all, k, add(load(y_all, k), load(tree.leap_up_s, q)))
     for k in range(last - 1, -1, -1):
+        leap = passed[k]
+        if leap >= 0 and leap != needed and leap != needed_too:
+            continue
+        leap = leaps[k]
+        if leap >= 0 and leap != needed and leap != needed_too:
+            climb_leap(tree, work, k, leap, sourced)
+            continue
         a, parent = lone[k], parents[k]
         if a >= 0 and k != edge:
             y1 = y_all[k, a, a]
@@ -118,6 +131,39 @@ def climb(tree: Tree, state: State, work: Work, s: int) -> int:
             if in_loop[k]:
                 hand_up(tree, work, k, parent)
     return flags
+
+
+@compiled
+def leaps_to_take_apart(tree: Tree, edge: int, far_node: int) -> tuple[int, int]:
+    """The leaps on whose edges or nodes something happens; -2: none."""
+    first = second = -2
+    if 0 <= edge < tree.passed.size:
+        first = max(tree.passed[edge], tree.leap[edge])
+    if far_node >= 0:
+        second = tree.passed[far_node]
+    return first if first >= 0 else -2, second if second >= 0 else -2
+
+
+@compiled
+def climb_leap(tree: Tree, work: Work, k: int, leap: int, sourced: bool) -> None:
+    """Eliminate all the edges of a leap at once, at whose end node k is."""
+    a, above = tree.lone_phase[k], tree.leap_from[leap]
+    y_all, up_s, low_s = work.y, tree.leap_up_s, tree.leap_low_s
+    if a >= 0:
+        y1 = y_all[k, a, a] + low_s[leap, a, a]
+        f1 = reciprocal(1.0 + tree.leap_z_ohm[leap, a, a] * y1)
+        work.f[k, a, a] = f1
+        y_all[above, a, a] += y1 * f1 + up_s[leap, a, a]
+        return
+    y, z = add(load(y_all, k), load(low_s, leap)), load(tree.leap_z_ohm, leap)
+    f, w = up(y, z)
+    store(work.f, k, f)
+    store(y_all, above, add(load(y_all, above), add(w, load(up_s, leap))))
+    if sourced:
+        none = tree.carried[k]
+        ahead, drawn = carry_current(y, z, f, load_vector(work.y_j, k), work, none)
+        store_vector(work.h_j, k, ahead)
+        store_vector(work.y_j, above, plus(load_vector(work.y_j, above), drawn))
 
 
 @compiled_apart
@@ -239,15 +285,23 @@ def descend(tree: Tree, state: State, work: Work, s: int) -> None:
     """Voltages from the source to the leaves, and the stubs of the event node."""
     parents, in_loop, lone, phases = tree.parent, tree.in_loop, tree.lone_phase, tree.phases
     v_all, f_all, fork = work.v, work.f, tree.fork
+    passed, leaps = tree.passed, tree.leap
     edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
     last = parents.size
     sourced = tree.machine_unit.size > 0
+    needed, needed_too = leaps_to_take_apart(tree, edge, state.far_node[s])
     for k in range(last):
+        leap = passed[k]
+        if leap >= 0 and leap != needed and leap != needed_too:
+            continue
+        leap, parent = leaps[k], parents[k]
+        if leap >= 0 and leap != needed and leap != needed_too:
+            parent = tree.leap_from[leap]
         a = lone[k]
         if a >= 0 and k != edge:
-            v_all[k, a] = f_all[k, a, a] * v_all[parents[k], a]
+            v_all[k, a] = f_all[k, a, a] * v_all[parent, a]
             continue
-        above = load_vector(v_all, parents[k] if k else last)
+        above = load_vector(v_all, parent if k else last)
         carried = tree.carried[k]
         if k == edge:
             v = descend_event(tree, work, 0, above, mask, carried)

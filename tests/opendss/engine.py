@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 __all__ = ["direct_voltages", "new_context"]
 
-FLOATING = 1e-9  #: singular values below this, of the matrix scaled to a unit diagonal
+FLOATING = 1e-9
+"""Singular values below this, of the matrix scaled to a unit diagonal: nothing holds the node, or
+so little (a dead end's charging) that the engine's nodal matrix has no digits left for it."""
 TRACE = 1e-6  #: a node that a floating pattern moves by more than this, of its largest
 
 Complex = NDArray[np.complex128]

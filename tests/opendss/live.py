@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,7 @@ def agreement(engine: Any, feeder: Feeder, cuts: list[Cut | None]) -> list[Agree
     alias = _aliases(feeder)
     rows = []
     for s, cut in enumerate(cuts):
-        theirs, floating = direct_voltages(engine, lambda held, own=cut: as_dss(feeder, own, held))
+        theirs, floating = direct_voltages(engine, partial(as_dss, feeder, cut))
         worst, worst_node, compared, left_out = 0.0, "", 0, 0
         for bus, mask in masks.items():
             for row, phase in enumerate("abc"):

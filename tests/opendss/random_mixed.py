@@ -99,7 +99,7 @@ class _Grown:
             self.line(bus)
         elif draw < 0.70:
             self.regulator(bus)
-        elif draw < 0.76:
+        elif draw < 0.76 and self.phases[bus] == "abc":  # a loop may not close over less
             far = self.seen(self.name(), self.phases[bus], self.zone[bus])
             name = f"SW{len(self.switches)}"
             self.switches.append(

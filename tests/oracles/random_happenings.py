@@ -154,7 +154,8 @@ def _edge(rng: np.random.Generator, network: Network) -> int:
     if network.chords and rng.random() < 0.5:
         first = len(network.nodes)
         ring = [k for k in lines if k >= first or network.tree.in_loop[k]]
-        chosen = lines[lines >= first] if rng.random() < 0.4 else np.array(ring)
+        chords = lines[lines >= first]
+        chosen = chords if rng.random() < 0.4 and chords.size else np.array(ring or lines)
     return int(rng.choice(chosen))
 
 

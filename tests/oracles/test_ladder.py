@@ -61,7 +61,7 @@ def _transferred(
     """Sometimes a point on the loop is opened, so that part of it is fed by the tie."""
     loop = compile_network(feeder, closed)
     ring = {loop.nodes[k] for k in np.flatnonzero(loop.tree.in_loop)}
-    ring.add(loop.nodes[loop.tree.fork])
+    ring |= {loop.nodes[k] for k in loop.tree.fork}
     ends = {line.name: {line.from_bus, line.to_bus} for line in feeder.lines}
     points = [p.name for p in feeder.points if ends[p.line] <= ring]
     if not points or rng.random() < 0.6:
@@ -254,6 +254,6 @@ def _switched(cases: list[Case]) -> str:
         return outcome.how
     ones: Real = np.ones((len(before.feeder.ders), 1))
     second = carried_over(after.network, first, answer, second, ones)
-    found = solve(after.network, second, start=answer.unit_v_pu)
+    found = solve(after.network, second, start=answer.winding_v_pu)
     state: dict[str, Any] = {"before": oracle, "opened": after.opened}
     return compare(after, found, after.event(after=True), oracle, **state)[0].how

@@ -9,7 +9,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from oracles.comparison import TOLERANCE, Case, Outcome, compare, outcomes
-from oracles.random_happenings import Happening, phases_of, random_happening
+from oracles.random_happenings import Happening, random_happening
 from oracles.random_mixed import random_mixed_feeder
 
 from openphase.model.errors import InputError
@@ -20,6 +20,7 @@ from openphase.model.parts import Feeder
 from openphase.model.solve import solve, steady_state
 
 FEEDERS = 300
+NONE: frozenset[str] = frozenset()
 
 Sample = dict[int, tuple[Case, list[Outcome]]]
 
@@ -30,55 +31,26 @@ def a_case(seed: int, *, linear: bool = False) -> Case | None:
     loops = int(rng.choice([0, 1, 2, 3], p=[0.5, 0.2, 0.15, 0.15]))
     feeder = random_mixed_feeder(rng, int(rng.integers(3, 17)), loops, linear=linear)
     ties = [s.name for s in feeder.switches if not s.closed and rng.random() < 0.75]
-    closed = frozenset([s.name for s in feeder.switches if s.closed] + ties)
-    opened = _opened(rng, feeder) if loops else frozenset()
-    if not _every_phase_is_fed(feeder, closed, opened):
-        opened = frozenset()
-    try:
-        network = compile_network(feeder, closed, opened)
-    except InputError:
-        return None
-    happening = random_happening(rng, feeder, network)
-    return Case(feeder=feeder, closed=closed, opened=opened, network=network, happening=happening)
-
-
-def _every_phase_is_fed(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) -> bool:
-    """No conductor is without a supply in this state of the switches."""
-    off = {(point.line, point.bus) for point in feeder.points if point.name in opened}
-    ends = [(own.name, own.phases, own.from_bus, own.to_bus) for own in feeder.lines]
-    joined = [
-        (phase, *(f"{bus}@{name}" if (name, bus) in off else bus for bus in buses))
-        for name, phases, *buses in ends
-        for phase in phases
-    ]
-    switches = [own for own in feeder.switches if own.name in closed]
-    joined += [(k, own.from_bus, own.to_bus) for own in switches for k in own.phases]
-    for own in feeder.regulators:
-        units = own.phases if own.reference == "earth" else "abc"
-        joined += [(phase, own.from_bus, own.to_bus) for phase in units]
-    steps = [({(k, a)}, {(k, b)}) for k, a, b in joined]
-    steps += [
-        ({(k, own.from_bus) for k in own.phases}, {(k, own.to_bus) for k in own.to_phases})
-        for own in feeder.inline_transformers
-    ]
-    fed = {(phase, feeder.source.bus) for phase in "abc"}
-    grown = True
-    while grown:
-        before = len(fed)
-        for near, far in steps:
-            fed |= far if near <= fed else set()
-            fed |= near if far <= fed else set()
-        grown = len(fed) > before
-    buses = {bus for _, _, *pair in ends for bus in pair}
-    there = {(phase, bus) for bus in buses for phase in phases_of(feeder, bus)}
-    return there <= fed and all(near | far <= fed for near, far in steps)
+    always = [s.name for s in feeder.switches if s.closed]
+    opened = _opened(rng, feeder) if loops else NONE
+    states = [(count, own) for count in range(len(ties), -1, -1) for own in (opened, NONE)]
+    for count, own in states:
+        # what the ladder refuses, a loop or a bus without supply, does not come about
+        closed = frozenset(always + ties[:count])
+        try:
+            network = compile_network(feeder, closed, own)
+        except InputError:
+            continue
+        happening = random_happening(rng, feeder, network)
+        return Case(feeder=feeder, closed=closed, opened=own, network=network, happening=happening)
+    return None
 
 
 def _opened(rng: np.random.Generator, feeder: Feeder) -> frozenset[str]:
     """Sometimes a point stands open."""
     names = [point.name for point in feeder.points]
     if not names or rng.random() < 0.7:
-        return frozenset()
+        return NONE
     return frozenset({names[int(rng.integers(len(names)))]})
 
 
@@ -107,7 +79,7 @@ def test_no_state_differs(sample: Sample) -> None:
 
 
 def test_hardly_any_feeder_is_refused(sample: Sample) -> None:
-    assert len(sample) >= 0.9 * FEEDERS
+    assert len(sample) >= 0.95 * FEEDERS
 
 
 def test_the_feeders_are_such_as_a_file_may_hold(sample: Sample) -> None:

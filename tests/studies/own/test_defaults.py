@@ -1,6 +1,7 @@
 """What a study takes where nothing is said: default points, and the study beside the feeder."""
 
 import argparse
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from openphase.model import load_feeder
 from openphase.model.distributions import Uniform
 from openphase.model.errors import InputError
 from openphase.model.reading.feeder_file import dump_feeder
+from openphase.studies.cli import main
 from openphase.studies.own.levels import measured_study_text
 from openphase.studies.run.session import read_feeder, read_own_study
 from openphase.studies.spec.study_file import MeasuredLoad, Study, default_study, study_beside
@@ -64,3 +66,22 @@ def test_a_feeder_without_three_phase_line_has_nothing_to_judge(tmp_path):
     file.write_text(dump_feeder(thin), encoding="utf-8")
     with pytest.raises(InputError, match="must name at least one section"):
         read_feeder(str(file))
+
+
+def test_check_shows_the_load_that_was_measured(bare, capsys):
+    def downstream(section):
+        assert main(["check", str(bare), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        row = next(own for own in found["sections"] if own["remote"] == section)
+        return row["downstream_kw"], row["downstream_kw_nominal"]
+
+    plain, nominal = downstream("M4")
+    assert plain[1] == pytest.approx(nominal[1] * 1.2)
+    text = '[[measured]]\npoint = "M3"\nlevel = [0.1, 0.5]\n'
+    study_beside(bare).write_text(f"format = 1\n{text}", encoding="utf-8")
+    measured, same = downstream("M4")
+    assert same == nominal
+    # all load beyond the section's near end lies beyond M3
+    assert measured[1] == pytest.approx(nominal[1] * 0.5 * 1.2)
+    assert main(["check", str(bare)]) == 0
+    assert "by what was measured at M3 0.1 to 0.5" in capsys.readouterr().out

@@ -97,7 +97,8 @@ CIRCUITS = {
         "new load.d bus1=m.1.2.3 phases=2 conn=delta kv=12.47 kw=200 pf=0.9 model=2",
         "new load.x bus1=m.1.2 phases=1 kv=12.47 kw=80 kvar=10 model=8 "
         "zipv=(0.5 0.2 0.3 0.1 0.4 0.5 0)",
-        "new load.y bus1=m.2 phases=1 kv=7.2 kw=80 kvar=30 model=8 zipv=(0.6 0.3 0.1 0.2 0.2 0.6 0)",
+        "new load.y bus1=m.2 phases=1 kv=7.2 kw=80 kvar=30 model=8 "
+        "zipv=(0.6 0.3 0.1 0.2 0.2 0.6 0)",
     ),
     "allocated loads": (
         "new load.k bus1=m phases=3 kv=12.47 xfkva=500 allocationfactor=0.6 pf=0.95",

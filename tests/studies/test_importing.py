@@ -1,0 +1,107 @@
+"""The verb ``import``: what it writes, what it says, and where OpenDSS files may stand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from dss_circuits import CIRCUITS, REGULATORS, script
+
+from openphase.model.reading.feeder_file import read_feeder
+from openphase.studies.cli import main
+
+CIRCUIT = script(
+    (
+        *REGULATORS["three"],
+        *CIRCUITS["transposed phases"][1:2],
+        "new line.on bus1=c bus2=d linecode=oh length=2 units=mi",
+        "new load.end bus1=d phases=3 kv=12.47 kw=400 pf=0.95",
+    )
+)
+
+
+@pytest.fixture
+def circuit(tmp_path: Path) -> Path:
+    pytest.importorskip("dss", reason="needs the extra: pip install 'openphase[opendss]'")
+    path = tmp_path / "town.dss"
+    path.write_text(CIRCUIT, encoding="utf-8")
+    return path
+
+
+def run(*words: object) -> int:
+    return main([str(word) for word in words])
+
+
+def test_it_writes_the_feeder_with_points_and_nothing_else(
+    circuit: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = circuit.parent / "town.toml"
+    assert run("import", circuit, "-o", out) == 0
+    assert {path.name for path in circuit.parent.iterdir()} == {"town.dss", "town.toml"}
+    feeder = read_feeder(out)
+    assert feeder.imported_from == "town.dss"
+    assert feeder.points
+    assert feeder.sections
+    answer = capsys.readouterr().out
+    assert "regulator r at taps 8, -2, 1" in answer
+    assert feeder.points[0].name in answer
+    assert all(len(line) <= 100 for line in answer.splitlines())
+
+
+def test_json_is_one_object_and_the_report_files_hold_it(
+    circuit: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page, data = circuit.parent / "town.md", circuit.parent / "report.json"
+    assert run("import", circuit, "--report", page) == 0
+    capsys.readouterr()
+    assert run("import", circuit, "--report", data, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    kept = json.loads(data.read_text(encoding="utf-8"))
+    assert kept == told
+    assert {row["mode"] for row in told["opendss"]} == {"snap", "direct"}
+    assert max(row["largest_pu"] for row in told["opendss"]) < 1e-6
+    assert page.read_text(encoding="utf-8").startswith("# Import of town.dss")
+    assert "told" not in {path.stem for path in circuit.parent.iterdir()}
+
+
+def test_points_may_be_given(circuit: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    points, out = circuit.parent / "points.csv", circuit.parent / "town.toml"
+    points.write_text("name,bus,line\nHEAD,s,trunk\nEND,c,on\n", encoding="utf-8")
+    assert run("import", circuit, "-o", out, "--points", points) == 0
+    assert [point.name for point in read_feeder(out).points] == ["HEAD", "END"]
+    assert "points.csv" in capsys.readouterr().out
+
+
+def test_a_reduced_feeder_says_its_error(circuit: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = circuit.parent / "town.toml"
+    assert run("import", circuit, "-o", out, "--reduce", "--json") == 0
+    assert "reduction" in json.loads(capsys.readouterr().out)
+    assert read_feeder(out).loads
+
+
+@pytest.mark.parametrize("words", [(), ("-o", "town.dss"), ("--report", "town.txt")])
+def test_outputs_are_asked_for_before_anything_is_read(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("import", "nowhere.dss", *words) == 2
+    assert "must be" in capsys.readouterr().err
+
+
+def test_other_verbs_take_the_file_itself(
+    circuit: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("check", circuit, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["imported_from"] == "town.dss"
+
+
+def test_what_cannot_be_imported_ends_with_code_2(
+    circuit: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = "new isource.x bus1=m phases=3 amps=1\n"
+    circuit.write_text(CIRCUIT + more, encoding="utf-8")
+    out = circuit.parent / "town.toml"
+    assert run("import", circuit, "-o", out) == 2
+    assert "--drop isource.x" in capsys.readouterr().err
+    assert not out.exists()
+    assert run("import", circuit, "-o", out, "--drop", "isource.x") == 0
