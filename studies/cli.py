@@ -183,6 +183,11 @@ def _import_arguments(parser: argparse.ArgumentParser) -> None:
         help="leave an element out, as class.name (may be given several times)",
     )
     parser.add_argument(
+        "--solve-controls",
+        action="store_true",
+        help="taps and capacitor steps where OpenDSS's controls settle (default: the file's)",
+    )
+    parser.add_argument(
         "--reduce",
         action="store_true",
         help="fold laterals and low-voltage networks; the error is measured and printed",

@@ -51,7 +51,7 @@ def import_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code. Refusals have ended it before."""
     _check_outputs(args)
     say(f"reading {args.file}")
-    imported = import_opendss(args.file, drop=args.drop)
+    imported = import_opendss(args.file, drop=args.drop, solve_controls=args.solve_controls)
     say(f"{len(imported.feeder.lines)} lines, {len(imported.feeder.loads)} loads; solving")
     report = fidelity_report(imported, differences(imported))
     work = _Work(feeder=imported.feeder)
@@ -126,7 +126,8 @@ def _write(work: _Work, args: argparse.Namespace, imported: Imported) -> list[Pa
         return []
     folded = ", laterals and low voltage folded" if args.reduce else ""
     dropped = f", without {', '.join(imported.dropped)}" if imported.dropped else ""
-    comment = f"Imported from {args.file.name} (OpenDSS){dropped}{folded}."
+    settled = ", taps where its controls settle" if args.solve_controls else ""
+    comment = f"Imported from {args.file.name} (OpenDSS){dropped}{settled}{folded}."
     feeder = replace(work.feeder, imported_from=args.file.name)
     written = list(write_feeder(feeder, args.output, comment=comment))
     if work.study is not None:

@@ -104,6 +104,13 @@ CIRCUITS = {
         "new load.k bus1=m phases=3 kv=12.47 xfkva=500 allocationfactor=0.6 pf=0.95",
         "new load.h bus1=m.1 phases=1 kv=7.2 kva=100 pf=0.8",
     ),
+    "opened elements": (
+        "new load.off bus1=m phases=3 kv=12.47 kw=400",
+        "new line.l1 bus1=m bus2=b linecode=oh length=1 units=km",
+        "new load.on bus1=b phases=3 kv=12.47 kw=400 model=2",
+        "open load.off 1",
+        "open line.l1 1 2",
+    ),
     "dead phases": (
         "new line.l1 bus1=m.1.2 bus2=b.1.2 phases=2 linecode=two length=1 units=km",
         "new line.l2 bus1=b bus2=c linecode=oh length=1 units=km",
@@ -177,6 +184,11 @@ TRANSFORMERS = {
         "kvs=(12.47 0.24 0.24) kvas=(50 50 50) xhl=2.46",
         "new load.one bus1=b.1 phases=1 kv=0.24 kw=8 pf=0.95",
         "new load.two bus1=b.2 phases=1 kv=0.24 kw=3 pf=0.9",
+    ),
+    "legs by default": (
+        "new transformer.t phases=1 windings=3 buses=(m.2 b.1.0 b.0.2) kvs=(7.2 .12 .12) "
+        "kvas=(25 25 25)",
+        "new load.both bus1=b.1.2 phases=1 kv=.24 kw=4",
     ),
     "earth return": (
         "new transformer.t phases=1 windings=2 buses=(m.1.2 b.1) conns=(delta wye) "

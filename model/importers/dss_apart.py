@@ -6,14 +6,17 @@ from collections.abc import Sequence
 
 from .dss_child import run_apart
 from .dss_circuit import read_circuit
-from .dss_engine import refusals_told, solved_volts, start, tell, version
+from .dss_engine import refusals_told, settled_state, solved_volts, start, tell, version
 from .dss_records import RawCircuit
 from .dss_script import Script
 
-__all__ = ["Volts", "read_apart", "solve_apart"]
+__all__ = ["Volts", "read_apart", "settle_apart", "solve_apart"]
 
 Volts = tuple[dict[tuple[str, int], complex], bool]
 """Voltage to earth of each (bus, node), and whether the solution converged."""
+
+Settled = tuple[dict[str, dict[str, float]], dict[str, list[int]]]
+"""Per transformer the tap of each winding, and per capacitor its steps."""
 
 _SECONDS = 600.0
 
@@ -47,6 +50,25 @@ def solve_apart(
     """
     request = (script, source, tuple(told), tuple(modes))
     return run_apart(_solve, request, source=source, seconds=_SECONDS)
+
+
+def settle_apart(script: Script, source: str) -> Settled:
+    """Return the taps and capacitor steps at which the engine's own controls settle.
+
+    Raises
+    ------
+    InputError
+        If they do not, or the engine dies or takes too long.
+    """
+    return run_apart(_settle, (script, source), source=source, seconds=_SECONDS)
+
+
+def _settle(request: tuple[Script, str]) -> Settled:
+    """Compile and let the controls act: the child's side."""
+    script, source = request
+    engine = start(script.commands, source)
+    with refusals_told(engine):
+        return settled_state(engine)
 
 
 def _read(request: tuple[Script, str]) -> tuple[RawCircuit, str]:

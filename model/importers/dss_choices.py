@@ -90,17 +90,26 @@ def _glob(pattern: str) -> str:
 
 
 def without(circuit: RawCircuit, dropped: Collection[str], findings: Findings) -> RawCircuit:
-    """Return the circuit without elements; what hung behind them is then not fed."""
-    if not dropped:
-        return circuit
-    lost = fed_kw(circuit) - fed_kw(circuit, dropped)
+    """Return the circuit without what is dropped or opened; what hung behind is then not fed."""
+    opened = {element for element, whole in circuit.opened if whole}
+    if dropped:
+        lost = fed_kw(circuit, opened) - fed_kw(circuit, {*opened, *dropped})
+        findings.note(f"{lost:.1f} kW of load went with what was dropped")
     for element in dropped:
         kind, _, name = element.partition(".")
         findings.add(kind, name, "dropped")
-    findings.note(f"{lost:.1f} kW of load went with what was dropped")
+    for element, whole in circuit.opened:
+        kind, _, name = element.partition(".")
+        if element in dropped:
+            continue
+        if whole:
+            findings.add(kind, name, "not fed", "opened at a terminal")
+        else:
+            findings.add(kind, name, "refused", "some of its conductors are open")
+    gone = {*opened, *dropped}
 
     def keep(kind: str, name: str) -> bool:
-        return f"{kind}.{name}" not in dropped
+        return f"{kind}.{name}" not in gone
 
     return replace(
         circuit,

@@ -90,8 +90,28 @@ def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) ->
         "capacitor": circuit.capacitors,
         "reactor": circuit.reactors,
     }
+    circuit = replace(circuit, opened=_opened_elements(engine, circuit))
     counted = sum(count_of(engine, kind) - len(parts) for kind, parts in enabled.items())
     return replace(circuit, disabled=counted)
+
+
+def _opened_elements(engine: Engine, circuit: RawCircuit) -> tuple[tuple[str, bool], ...]:
+    """Return the elements other than lines that have open conductors, and whether all are."""
+    names = [f"transformer.{unit.name}" for unit in circuit.transformers]
+    names += [f"load.{load.name}" for load in circuit.loads]
+    names += [f"capacitor.{bank.name}" for bank in circuit.capacitors]
+    names += [f"reactor.{reactor.name}" for reactor in circuit.reactors]
+    names += [f"{plant.kind}.{plant.name}" for plant in circuit.plants]
+    found = []
+    for name in names:
+        engine.circuit.SetActiveElement(name)
+        active = engine.circuit.ActiveCktElement
+        terminals = range(1, int(active.NumTerminals) + 1)
+        phases = range(1, int(active.NumPhases) + 1)
+        if any(active.IsOpen(terminal, 0) for terminal in terminals):
+            whole = any(all(active.IsOpen(t, phase) for phase in phases) for t in terminals)
+            found.append((name, whole))
+    return tuple(found)
 
 
 def _each(engine: Engine, kind: str, read: Callable[[Props], _T]) -> tuple[_T, ...]:
@@ -211,11 +231,13 @@ def _opened(engine: Engine, element: str, phases: int) -> tuple[tuple[bool, ...]
 
 def _transformer(row: Props) -> RawTransformer:
     phases = int(row["phases"])
+    across = [float(value) for value in row["xscarray"]] + [0.0, 0.0]
     return RawTransformer(
         name=_name(row),
         phases=phases,
         windings=tuple(_winding(row, n, phases) for n in range(len(row["kvs"]))),
-        x_pct=(float(row["xhl"]), float(row["xht"]), float(row["xlt"])),
+        # what counts: xhl, xht and xlt may tell a default that the engine does not use
+        x_pct=(across[0], across[1], across[2]),
         imag_pct=float(row["%imag"]),
         noload_pct=float(row["%noloadloss"]),
         euro=str(row["leadlag"]).lower() in {"lead", "euro"},

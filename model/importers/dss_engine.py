@@ -20,6 +20,7 @@ __all__ = [
     "count_of",
     "refusals_told",
     "rows_of",
+    "settled_state",
     "solved_volts",
     "start",
     "tell",
@@ -152,3 +153,28 @@ def solved_volts(engine: Engine, *, mode: str) -> tuple[dict[tuple[str, int], co
         bus, _, node = name.rpartition(".")
         nodes[(bus.lower(), int(node))] = complex(value)
     return nodes, bool(engine.circuit.Solution.Converged)
+
+
+def settled_state(engine: Engine) -> tuple[dict[str, dict[str, float]], dict[str, list[int]]]:
+    """Let the engine's own controls settle, and return all taps and capacitor steps.
+
+    Raises
+    ------
+    InputError
+        If they do not settle.
+    """
+    options = ("controlmode=static", "maxcontroliter=200", "maxiterations=500", "mode=snap")
+    tell(engine, (f"Set {option}" for option in options))
+    engine.circuit.Solution.Solve()
+    if not engine.circuit.Solution.Converged or not engine.circuit.Solution.ControlActionsDone:
+        rule = "do not settle: leave --solve-controls out, and taps stay as the file has them"
+        raise InputError.single(engine.source, "the circuit's controls", None, rule)
+    taps = {
+        str(row["Name"]).lower(): {str(n): float(tap) for n, tap in enumerate(row["taps"], start=1)}
+        for row in rows_of(engine, "transformer")
+    }
+    states = {
+        str(row["Name"]).lower(): [int(state) for state in row["states"]]
+        for row in rows_of(engine, "capacitor")
+    }
+    return taps, states

@@ -12,7 +12,7 @@ from ..buses import bus_volts
 from ..errors import Fault, InputError
 from ..feeder import make_feeder
 from ..parts import Coordinates, Feeder, InlineTransformer, Load, Place, Regulator, Source
-from .dss_apart import read_apart
+from .dss_apart import read_apart, settle_apart
 from .dss_choices import (
     CapacitorStates,
     Taps,
@@ -25,7 +25,7 @@ from .dss_choices import (
 from .dss_lines import LineParts, line_parts
 from .dss_live import Node, live_nodes
 from .dss_loads import capacitor_of, der_of, loads_of
-from .dss_names import Names, letters
+from .dss_names import Names, clean, letters
 from .dss_neutrals import neutrals_of
 from .dss_records import RawCircuit, RawReactor
 from .dss_regulators import regulators_of, with_tap_changer
@@ -72,6 +72,7 @@ def import_opendss(
     drop: Collection[str] = (),
     taps: Taps | None = None,
     capacitor_states: CapacitorStates | None = None,
+    solve_controls: bool = False,
 ) -> Imported:
     """Return the feeder that an OpenDSS file describes.
 
@@ -83,6 +84,8 @@ def import_opendss(
         Elements to leave out, as ``class.name``; ``*`` stands for any letters.
     taps, capacitor_states
         Positions other than those of the file.
+    solve_controls
+        Take the positions at which OpenDSS's own controls settle, where none are given.
 
     Raises
     ------
@@ -94,11 +97,17 @@ def import_opendss(
     """
     script = read_script(path)
     circuit, engine = read_apart(script, path.name)
+    if solve_controls:
+        settled_taps, settled_states = settle_apart(script, path.name)
+        taps = settled_taps if taps is None else taps
+        capacitor_states = settled_states if capacitor_states is None else capacitor_states
     if taps is not None:
         circuit = with_taps(circuit, taps)
     if capacitor_states is not None:
         circuit = with_states(circuit, capacitor_states)
     findings = Findings()
+    if solve_controls:
+        findings.note("taps and capacitor steps are those at which OpenDSS's controls settle")
     dropped = chosen(circuit, drop, path.name)
     circuit = without(circuit, dropped, findings)
     build = _Build(circuit=circuit, live=live_nodes(circuit), findings=findings)
@@ -149,7 +158,7 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
     shunts = _shunts(build)
     raise_refusals(circuit, findings, source_name)
     feeder = Feeder(
-        name=circuit.name.replace("/", "_").replace("\\", "_"),
+        name=clean(circuit.name).translate({ord("/"): "_", ord("\\"): "_"}).strip(".") or "circuit",
         source=source,
         lines=tuple(build.built.lines),
         transformers=(),

@@ -201,4 +201,5 @@ class RawCircuit:
     cap_controls: tuple[str, ...]  #: names alone
     others: tuple[OtherElement, ...]
     disabled: int
+    opened: tuple[tuple[str, bool], ...] = ()  #: elements but lines, and whether all of each is
     coordinates: tuple[tuple[str, float, float], ...] = ()

@@ -45,10 +45,19 @@ def _class_table(report: dict[str, Any]) -> _Table:
 
 
 def _voltage_table(report: dict[str, Any]) -> _Table:
-    head = ("loads", "largest", "at", "nodes", "floating", "dead", "range", "settled here / there")
-    rows = [
+    head: tuple[str, ...] = (
+        "loads",
+        "largest",
+        "at",
+        "nodes",
+        "floating",
+        "dead",
+        "range",
+        "settled here / there",
+    )
+    rows: list[tuple[str, ...]] = [
         (
-            row["mode"],
+            str(row["mode"]),
             f"{row['largest_pu']:.1e} pu",
             f"{row['bus']} {row['phase']}",
             str(row["nodes"]),
@@ -83,9 +92,7 @@ def _sentences(report: dict[str, Any]) -> list[str]:
         f"buses by kV: {_counts(total['buses_by_kv'])}",
     ]
     for name, taps in total["regulators"].items():
-        found.append(
-            f"regulator {name} at taps {taps[0]}, {taps[1]}, {taps[2]}, as the file has it"
-        )
+        found.append(f"regulator {name} at taps {taps[0]}, {taps[1]}, {taps[2]}")
     found += [_group(row) for row in report["how"]]
     if report["disabled"]:
         found.append(f"{report['disabled']} elements are disabled in the file: not there")
@@ -93,7 +100,7 @@ def _sentences(report: dict[str, Any]) -> list[str]:
         left_out = report["left_out"]
         first = "; ".join(left_out["first"][:2])
         found.append(f"{left_out['count']} commands or properties of the files left out: {first} …")
-    return found + report["notes"]
+    return [*found, *report["notes"]]
 
 
 def _group(row: dict[str, Any]) -> str:

@@ -22,11 +22,11 @@ def unearthed_buses(feeder: Feeder) -> frozenset[str]:
             bus = root[bus]
         return bus
 
-    for edge in (*feeder.lines, *feeder.regulators):
-        root[find(edge.from_bus)] = find(edge.to_bus)
-    for switch in feeder.switches:
-        if switch.closed:
-            root[find(switch.from_bus)] = find(switch.to_bus)
+    ends = [(line.from_bus, line.to_bus) for line in feeder.lines]
+    ends += [(regulator.from_bus, regulator.to_bus) for regulator in feeder.regulators]
+    ends += [(switch.from_bus, switch.to_bus) for switch in feeder.switches if switch.closed]
+    for start, end in ends:
+        root[find(start)] = find(end)
     earthed = set() if feeder.source.neutral == "isolated" else {find(feeder.source.bus)}
     for unit in feeder.inline_transformers:
         here, there = _earths(unit)
@@ -34,9 +34,11 @@ def unearthed_buses(feeder: Feeder) -> frozenset[str]:
         earthed |= {find(unit.to_bus)} if there else set()
         find(unit.from_bus)
         find(unit.to_bus)
-    for part in (*feeder.loads, *feeder.capacitors):
-        if part.connection == "wye" and part.place is not None and part.place.bus is not None:
-            earthed.add(find(part.place.bus))
+    shunts = [(load.connection, load.place) for load in feeder.loads]
+    shunts += [(bank.connection, bank.place) for bank in feeder.capacitors]
+    for connection, place in shunts:
+        if connection == "wye" and place is not None and place.bus is not None:
+            earthed.add(find(place.bus))
     return frozenset(bus for bus in root if find(bus) not in earthed)
 
 

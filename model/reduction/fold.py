@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..buses import bus_volts
 from ..parts import Feeder, InlineTransformer, Line, Load
+from ..solver.assemble import law_factors
 from .choose import ENDS, Choice, SeenRoot, best_equivalent
-from .equivalent import Equivalent, Kind, SeenLoad, gain_through
+from .equivalent import Equivalent, Fit, Kind, SeenLoad, gain_through
 from .foldable import fold_roots, kept_by_default
 from .folded_part import FoldedPart, Seen, folded_part, seen_from_roots
 from .rebuild import Stub, WasAt, free_name, moved_load, names_in, stub_of
@@ -108,11 +109,11 @@ def fold(
         hertz = feeder.source.frequency_hz
         stubs.append(stub_of(ends, equivalent, account.km, rating, hertz))
         v = gain_through(equivalent, level, seen[n].loads) @ root_v[n]
-        for fit, rows in zip(equivalent.fits, own[n], strict=True):
+        for was, fit, rows in zip(
+            _were_at(part, state, own[n], equivalent.fits), equivalent.fits, own[n], strict=True
+        ):
             load = part.loads[part.branch_load[rows[0]]]
-            was = _was_at(part, state, rows)
-            how_there = (fit, equivalent.paired)
-            moved[load.name] = moved_load(load, stubs[-1].bus, how_there, was, v)
+            moved[load.name] = moved_load(load, stubs[-1].bus, (fit, equivalent.paired), was, v)
     return Folded(
         feeder=_rebuilt(feeder, root_of, stubs, moved),
         buses_before=len(volts),
@@ -159,14 +160,31 @@ def _rows_of_loads(part: FoldedPart) -> list[list[NDArray[np.int64]]]:
     return own
 
 
-def _was_at(part: FoldedPart, state: Seen, rows: NDArray[np.int64]) -> WasAt:
-    """A load's branches on average; they are equal but for their voltages."""
-    return WasAt(
-        y_s=complex(state.branch_y_s[rows].mean()),
-        nominal_y_s=complex(part.branch_y_s[rows[0]]),
-        v=float(np.abs(state.branch_v[rows]).mean()),
-        nominal_v=float(part.branch_v[rows[0]]),
-    )
+def _were_at(
+    part: FoldedPart, state: Seen, rows: Sequence[NDArray[np.int64]], fits: Sequence[Fit]
+) -> list[WasAt]:
+    """Where the loads of a root stood.
+
+    Those that will stand alike, with one law, are given one voltage in pu, their mean by power:
+    within a law's limits that changes nothing, and the solver looks them up but once.
+    """
+    size, weighted = defaultdict[object, float](float), defaultdict[object, float](float)
+    keys, own = [], []
+    for fit, branches in zip(fits, rows, strict=True):
+        n = int(part.branch_load[branches[0]])
+        v_pu = np.abs(state.branch_v[branches]) / part.branch_v[branches]
+        power = float(np.abs(state.branch_y_s[branches] * state.branch_v[branches] ** 2).sum())
+        keys.append((fit.phases, fit.connection, part.laws[n].tobytes()))
+        own.append((n, v_pu, complex(state.branch_y_s[branches].mean())))
+        size[keys[-1]] += power
+        weighted[keys[-1]] += power * float(v_pu.mean())
+    found = []
+    for key, (n, v_pu, y) in zip(keys, own, strict=True):
+        common = weighted[key] / size[key] if size[key] else float(v_pu.mean())
+        laws = [law_factors(part.laws, n, v) for v in v_pu * (common / v_pu.mean())]
+        g, b = np.mean(laws, axis=0)
+        found.append(WasAt(y_s=y, factors=(float(g), float(b)), v_pu=common))
+    return found
 
 
 def _km(

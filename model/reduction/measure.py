@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..leaps import with_leaps
 from ..network import Network, compile_network, locate
 from ..parts import Feeder
-from ..points import Points, find_points, into_line
+from ..points import Points, find_points, into_line, point_probes
 from ..solve import quiet_state, solve
-from ..states import NOT_CONVERGED, Answer, Probes, State
+from ..states import BY_LAW, NOT_CONVERGED, Answer, Probes, State
 from .fold import Folded
 
 __all__ = ["LEVEL_RANGE", "OWN_RANGE", "Measured", "Spread", "measure"]
@@ -27,8 +28,6 @@ LEVEL_RANGE = (0.25, 1.0)
 """Level of all loads of a scenario, as a study draws it by default."""
 OWN_RANGE = (0.8, 1.2)
 """Each load's own factor on it."""
-OWN_LAW = -1.0
-"""Exponent of a load that follows its own law."""
 LEAST_DI1_A = 0.1
 """Changes of the current below this are not compared: no setting is as low."""
 ROUNDING = 1e-9
@@ -68,9 +67,9 @@ class _Case:
     """One of the two feeders, ready to be solved."""
 
     network: Network
+    merged: Network  #: without the buses that only pass current on, as a study solves it
     points: Points
     nodes: Int  #: of the buses that are compared
-    probes: Probes
 
 
 def measure(
@@ -99,7 +98,7 @@ def measure(
     converged = np.ones(scenarios, np.bool_)
     for result in found:
         converged &= result.converged
-    gaps = np.abs(_volts(cases[0], found[0]) - _volts(cases[1], found[1]))
+    gaps = np.abs(found[0].v_pu - found[1].v_pu)
     (z, di1), (z_folded, di1_folded) = (
         _impedance(case, each, breaks.terminal) for case, each in zip(cases, found, strict=True)
     )
@@ -122,11 +121,14 @@ def _cases(feeder: Feeder, folded: Folded) -> list[_Case]:
     for each, network in zip((feeder, folded.feeder), networks, strict=True):
         points = find_points(each, network)
         index = {name: k for k, name in enumerate(network.nodes)}
-        nodes = np.array([index[bus] for bus in both], np.int64)
-        probes = Probes(
-            v_node=np.append(points.node, nodes), i_edge=points.edge, i_below=points.below
+        cases.append(
+            _Case(
+                network=network,
+                merged=with_leaps(network, point_probes(points)),
+                points=points,
+                nodes=np.array([index[bus] for bus in both], np.int64),
+            )
         )
-        cases.append(_Case(network=network, points=points, nodes=nodes, probes=probes))
     return cases
 
 
@@ -143,7 +145,8 @@ class _Breaks:
 class _Solved:
     """The states before and after the break."""
 
-    answers: Sequence[Answer]
+    v_pu: Complex  #: (nodes, 3, S) before the break
+    answers: Sequence[Answer]  #: at the points
     converged: NDArray[np.bool_]
     per_s: float
 
@@ -166,19 +169,24 @@ def _solved(case: _Case, names: Sequence[str], scale: Real, breaks: _Breaks) -> 
     network = case.network
     row = {name: n for n, name in enumerate(names)}
     own = np.ascontiguousarray(scale[[row[name] for name in network.loads]])
-    before = quiet_state(network, own, np.full(own.shape, OWN_LAW))
+    before = quiet_state(network, own, np.full(own.shape, BY_LAW))
     sites = [locate(network, *place) for place in breaks.places]
     after = before._replace(
         edge=np.array([edge for edge, _ in sites], np.int64),
         share=np.array([share for _, share in sites]),
         open_mask=np.left_shift(1, breaks.phase),
     )
-    solve(network, _first(before), case.probes)  # the first call may compile
+    nowhere = np.zeros(0, np.int64)
+    everywhere = Probes(v_node=case.nodes, i_edge=nowhere, i_below=nowhere.astype(np.bool_))
+    quiet = solve(network, before, everywhere)
+    probes = point_probes(case.points)
+    solve(case.merged, _first(before), probes)  # the first call may compile
     start = time.perf_counter()
-    answers = [solve(network, state, case.probes) for state in (before, after)]
+    answers = [solve(case.merged, state, probes) for state in (before, after)]
     took = time.perf_counter() - start
-    flags = answers[0].flags | answers[1].flags
+    flags = quiet.flags | answers[0].flags | answers[1].flags
     return _Solved(
+        v_pu=np.asarray(quiet.v / network.node_v[case.nodes][:, None, None]),
         answers=answers,
         converged=np.asarray(flags & NOT_CONVERGED == 0),
         per_s=2.0 * scale.shape[1] / took,
@@ -190,12 +198,6 @@ def _first(state: State) -> State:
     return State._make(np.ascontiguousarray(values[..., :1]) for values in state)
 
 
-def _volts(case: _Case, solved: _Solved) -> Complex:
-    """(nodes, 3, S) voltages before the break in pu, of the buses that are compared."""
-    v = solved.answers[0].v[len(case.points.names) :]
-    return np.asarray(v / case.network.node_v[case.nodes][:, None, None])
-
-
 def _impedance(case: _Case, solved: _Solved, terminal: Int) -> tuple[Complex, Complex]:
     """(S,) equation (5) in the positive sequence at each scenario's terminal, and dI1 there.
 
@@ -204,7 +206,7 @@ def _impedance(case: _Case, solved: _Solved, terminal: Int) -> tuple[Complex, Co
     points = case.points
     weights = np.array([1.0, TURN, TURN**2]) / 3.0
     into = into_line(points)[:, None]
-    v = [np.einsum("k,pks->ps", weights, a.v[: len(points.names)]) for a in solved.answers]
+    v = [np.einsum("k,pks->ps", weights, a.v) for a in solved.answers]
     i = [into * np.einsum("k,pks->ps", weights, a.i) for a in solved.answers]
     scenario = np.arange(terminal.size)
     here = np.array([t.local_point for t in points.terminals])[terminal]

@@ -34,9 +34,8 @@ class WasAt:
     """Where a load stood: what its branches were, at the level of the fold."""
 
     y_s: complex  #: of a branch, at its voltage
-    nominal_y_s: complex
-    v: float  #: of a branch
-    nominal_v: float
+    factors: tuple[float, float]  #: its law's on conductance and susceptance, at ``v_pu``
+    v_pu: float  #: of a branch, for its law
 
 
 def moved_load(load: Load, bus: str, how: tuple[Fit, bool], was: WasAt, v: Complex) -> Load:
@@ -54,15 +53,10 @@ def moved_load(load: Load, bus: str, how: tuple[Fit, bool], was: WasAt, v: Compl
     """
     fit, paired = how
     here = across(fit.phases, fit.connection)
-    # its own law meets the same voltage in pu as before
-    kv = was.nominal_v * float(np.abs(here @ v).mean()) / was.v / 1000.0
+    kv = float(np.abs(here @ v).mean()) / was.v_pu / 1000.0
     y = fit.share * was.y_s
-    g, b = y.real, y.imag
-    # what its law makes of it there, it will make of it here
-    if was.y_s.real != 0.0:
-        g *= was.nominal_y_s.real / was.y_s.real
-    if was.y_s.imag != 0.0:
-        b *= was.nominal_y_s.imag / was.y_s.imag
+    # what its law makes of it here, it has taken already
+    g, b = (value / factor for value, factor in zip((y.real, y.imag), was.factors, strict=True))
     kva = complex(g, -b) * kv**2 * 1000.0 * len(here)
     return replace(
         load,

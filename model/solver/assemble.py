@@ -189,7 +189,7 @@ def add_shunt(stack: Complex, k: int, i: int, earth: complex, between: complex) 
     stack[k, following, i] -= between
 
 
-@compiled_apart
+@compiled
 def set_event_shunts(tree: Tree, state: State, work: Work, s: int, floor_pu: float) -> None:
     """Shunts at p and q; and the charging of the two parts of the event's edge."""
     event_y, edge, share = work.event_y, state.edge[s], state.share[s]

@@ -57,7 +57,7 @@ def start(work: Work, carried: Flags) -> float:
     return max(SINGULAR**2 * largest, NOTHING_S**2)
 
 
-@compiled_apart
+@compiled
 def open_phases(mask: int, work: Work, carried: Flags) -> int:
     """Open the phases in ``mask``; returns flags.
 
@@ -87,7 +87,7 @@ def open_phases(mask: int, work: Work, carried: Flags) -> int:
     return flags
 
 
-@compiled_apart
+@compiled
 def replace_phase(a: int, zero: bool, work: Work, carried: Flags) -> None:
     """Put the voltage of an open phase, or zero, in terms of the others."""
     w, p, x_j, h_j = work.here[0], work.here[1], work.here_j[0], work.here_j[1]

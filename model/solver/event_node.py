@@ -30,7 +30,7 @@ Flags = NDArray[np.bool_]
 ABOVE, AT, BELOW, LOOSE = 0, 1, 2, 3  #: slots of `Work.event`
 
 
-@compiled_apart
+@compiled
 def climb_series(work: Work, slot: int, z: Matrix, carried: Flags) -> None:
     """Climb over ``z``: ``here`` has what is below it and receives what is seen from above.
 
@@ -73,7 +73,7 @@ def end_at(work: Work, k: int, carried: Flags) -> None:
             store(work.x[k], c, load(work.here_x, c))
 
 
-@compiled_apart
+@compiled
 def climb_low(
     tree: Tree, work: Work, k: int, slot: int, z: Matrix, carried: Flags, x_j: Vector
 ) -> int:
@@ -97,7 +97,7 @@ def climb_low(
     return flags
 
 
-@compiled_apart
+@compiled
 def climb_event(
     tree: Tree, work: Work, k: int, z: Matrix, share: float, mask: int, carried: Flags, x_j: Vector
 ) -> int:
@@ -114,7 +114,7 @@ def climb_event(
     return flags
 
 
-@compiled_apart
+@compiled
 def cross(work: Work, z: Matrix, mask: int, below: int, carried: Flags) -> int:
     """Climb over the event node and the series impedance ``z`` above it; returns flags.
 
@@ -136,7 +136,7 @@ def cross(work: Work, z: Matrix, mask: int, below: int, carried: Flags) -> int:
     return flags
 
 
-@compiled_apart
+@compiled
 def descend_event(
     tree: Tree, work: Work, near: int, above: Vector, mask: int, carried: Flags
 ) -> Vector:

@@ -348,7 +348,7 @@ def descend_chord_event(tree: Tree, work: Work, c: int, share: float, mask: int)
     store_vector(work.stub, 1 - side, v)
 
 
-@compiled_apart
+@compiled
 def edge_current(tree: Tree, state: State, work: Work, s: int, k: int, below: bool) -> Vector:
     """Current from above into edge k, or ``below``: out of its lower end."""
     parents, v_all, edge, share = tree.parent, work.v, state.edge[s], state.share[s]

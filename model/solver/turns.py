@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled, compiled_apart
+from ..compiled import compiled
 from ..states import State, Tree, Work
 from .matrix3 import IDENTITY, Matrix, load, load_vector, product, store, store_vector, times
 
@@ -41,7 +41,7 @@ def turn_of(tree: Tree, state: State, work: Work, k: int, s: int) -> Matrix:
     return load(tree.turn, tree.transformer[k])
 
 
-@compiled_apart
+@compiled
 def turn_edge(tree: Tree, state: State, work: Work, k: int, s: int, carried: Flags) -> None:
     """Put what stands at the upper end of edge k above the rest of it."""
     t = turn_of(tree, state, work, k, s)

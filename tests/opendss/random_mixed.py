@@ -17,6 +17,7 @@ from openphase.model.parts import (
     Line,
     LineCode,
     Load,
+    Neutral,
     Place,
     Regulator,
     Source,
@@ -36,6 +37,7 @@ THREE_PHASE: tuple[InlineConnection, ...] = (
     "Y/D",
     "D/D",
 )
+NEUTRALS: tuple[Neutral, ...] = ("solid", "solid", "solid", "resistor", "isolated")
 LOW_KV = (0.48, 4.16, 12.47)
 
 
@@ -291,7 +293,7 @@ def _rows(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
 def _assembled(grown: _Grown, loads: tuple[Load, ...], capacitors: tuple[Capacitor, ...]) -> Feeder:
     rng = np.random.default_rng(len(grown.lines))
     short = grown.kv**2 / 200.0
-    neutral = ("solid", "solid", "solid", "resistor", "isolated")[int(rng.integers(5))]
+    neutral = NEUTRALS[int(rng.integers(len(NEUTRALS)))]
     return Feeder(
         name="mixed",
         source=Source(

@@ -95,6 +95,18 @@ def test_other_verbs_take_the_file_itself(
     assert json.loads(capsys.readouterr().out)["imported_from"] == "town.dss"
 
 
+def test_taps_may_be_those_at_which_the_controls_settle(
+    circuit: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = circuit.parent / "file.toml", circuit.parent / "settled.toml"
+    assert run("import", circuit, "-o", files[0]) == 0
+    assert run("import", circuit, "-o", files[1], "--solve-controls") == 0
+    assert "controls settle" in capsys.readouterr().out
+    (kept,), (settled,) = (read_feeder(file).regulators for file in files)
+    assert kept.taps == (8, -2, 1)
+    assert settled.taps != kept.taps
+
+
 def test_what_cannot_be_imported_ends_with_code_2(
     circuit: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
