@@ -68,7 +68,7 @@ def start_of(start: Start, network: Network, state: State) -> Real:
     stub = 1.0 - np.where(state.edge >= 0, _mean(state.load_scale), 0.0) * drop.T
     rows = _stub_rows(network)
     found = np.concatenate([windings[: rows.start], stub, windings[rows.start :]])
-    return np.clip(found, LEAST_PU, MOST_PU)
+    return np.asarray(np.clip(found, LEAST_PU, MOST_PU))
 
 
 def _stub_rows(network: Network) -> slice:
