@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ...model.distributions import Choices
 from ...model.events.base import Places, places_on
+from ...model.leaps import with_leaps
 from ...model.network import CONNECTIONS, Network, compile_network
 from ...model.parts import Feeder
-from ...model.points import Points, find_points
+from ...model.points import Points, find_points, point_probes
 from ...model.sides import edge_nodes
 from ...optimise.counts import Grid
 from ..spec.events import CLASSES, SwitchState
@@ -120,7 +121,8 @@ def _wire(feeder: Feeder, study: Study, state: GroupSpec | SwitchState) -> Wired
     motors = study.motors.share is not None
     network = compile_network(feeder, closed, opened, motors=motors)
     points = find_points(feeder, network, opened)
-    return Wired(network=network, points=points, start=fit_start(network, study))
+    start = fit_start(network, study)
+    return Wired(network=with_leaps(network, point_probes(points)), points=points, start=start)
 
 
 def _case(
