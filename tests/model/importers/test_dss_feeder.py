@@ -165,6 +165,48 @@ def test_fuses_and_open_lines_come_in_as_switches(tmp_path: Path) -> None:
     assert lines["open"].to_bus == switches["open"].from_bus
 
 
+@pytest.mark.parametrize(
+    ("more", "closed"),
+    [("action=open", False), ("normal=open", False), ("action=open lock=yes", True)],
+)
+@needs_engine
+def test_a_switch_control_opens_what_the_engine_opens(
+    more: str, closed: bool, tmp_path: Path
+) -> None:
+    found = imported(
+        tmp_path,
+        "new line.l1 bus1=m bus2=b linecode=oh length=1 units=mi",
+        "new line.l2 bus1=m bus2=b linecode=oh length=2 units=mi",
+        "new load.l bus1=b phases=3 kv=12.47 kw=900",
+        f"new swtcontrol.sw switchedobj=line.l1 switchedterm=2 {more}",
+    )
+    assert [switch.closed for switch in found.feeder.switches] == [closed]
+    assert max(row.largest_pu for row in differences(found)) < 1e-6
+
+
+@needs_engine
+def test_matrices_of_another_frequency_take_the_earth_with_them(tmp_path: Path) -> None:
+    found = imported(
+        tmp_path,
+        "new linecode.fifty nphases=3 r1=.3 x1=.6 r0=.6 x0=1.8 c1=3 c0=2 units=km basefreq=50",
+        "new line.l1 bus1=m bus2=b linecode=fifty length=9 units=km",
+        "new load.l bus1=b.1 phases=1 kv=7.2 kw=900",
+    )
+    assert max(row.largest_pu for row in differences(found)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("more", "wanted"),
+    [("bus2=s.4.4.4", "bus2 must be earth"), ("sequence=neg", "sequence must be pos")],
+)
+@needs_engine
+def test_a_source_that_the_model_does_not_have_is_refused(
+    more: str, wanted: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=wanted):
+        imported(tmp_path, f"edit vsource.source {more}")
+
+
 @needs_engine
 def test_lines_of_different_phases_between_two_buses_become_one(tmp_path: Path) -> None:
     found = imported(tmp_path, *CIRCUITS["lines side by side"])
