@@ -127,8 +127,9 @@ def _write(work: _Work, args: argparse.Namespace, imported: Imported) -> list[Pa
     folded = ", laterals and low voltage folded" if args.reduce else ""
     dropped = f", without {', '.join(imported.dropped)}" if imported.dropped else ""
     settled = ", taps where its controls settle" if args.solve_controls else ""
-    comment = f"Imported from {args.file.name} (OpenDSS){dropped}{settled}{folded}."
-    feeder = replace(work.feeder, imported_from=args.file.name)
+    changed = f"{dropped}{settled}{folded}"
+    comment = f"Imported from {args.file.name} (OpenDSS){changed}."
+    feeder = replace(work.feeder, imported_from=f"{args.file.name}{changed}")
     written = list(write_feeder(feeder, args.output, comment=comment))
     if work.study is not None:
         study = args.output.with_suffix(".study.toml")

@@ -78,6 +78,8 @@ def test_a_reduced_feeder_says_its_error(circuit: Path, capsys: pytest.CaptureFi
     assert run("import", circuit, "-o", out, "--reduce", "--json") == 0
     assert "reduction" in json.loads(capsys.readouterr().out)
     assert read_feeder(out).loads
+    assert run("check", out) == 0
+    assert "(from town.dss, laterals and low voltage folded)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("words", [(), ("-o", "town.dss"), ("--report", "town.txt")])
