@@ -62,6 +62,7 @@ _UNREAD = (
 
 def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) -> RawCircuit:
     """Return what the engine's circuit is made of, disabled elements left out."""
+    _open_what_is_told_open(engine)
     solution = engine.circuit.Solution
     circuit = RawCircuit(
         name=str(engine.circuit.Name),
@@ -93,6 +94,14 @@ def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) ->
     circuit = replace(circuit, opened=_opened_elements(engine, circuit))
     counted = sum(count_of(engine, kind) - len(parts) for kind, parts in enabled.items())
     return replace(circuit, disabled=counted)
+
+
+def _open_what_is_told_open(engine: Engine) -> None:
+    """Open what a SwtControl holds open, which the engine does only when its controls act."""
+    for row in rows_of(engine, "swtcontrol"):
+        if str(row["state"]).lower() == "open" and row["switchedobj"]:
+            engine.circuit.SetActiveElement(str(row["switchedobj"]))
+            engine.circuit.ActiveCktElement.Open(int(row["switchedterm"]), 0)
 
 
 def _opened_elements(engine: Engine, circuit: RawCircuit) -> tuple[tuple[str, bool], ...]:
