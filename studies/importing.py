@@ -137,10 +137,12 @@ def _write(work: _Work, args: argparse.Namespace, imported: Imported) -> list[Pa
     comment = f"Imported from {args.file.name} (OpenDSS){changed}."
     feeder = replace(work.feeder, imported_from=f"{args.file.name}{changed}")
     written = list(write_feeder(feeder, args.output, comment=comment))
+    study = args.output.with_suffix(".study.toml")
     if work.study is not None:
-        study = args.output.with_suffix(".study.toml")
         study.write_text(work.study, encoding="utf-8")
         written.append(study)
+    elif study.exists():
+        say(f"{study} is older and still goes with this feeder: remove it if it should not")
     return written
 
 
