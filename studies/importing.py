@@ -18,7 +18,7 @@ from ..model.importers.report_text import report_markdown, report_text
 from ..model.parts import Feeder
 from ..model.reading.feeder_file import write_feeder
 from ..model.reduction.fold import fold
-from ..model.reduction.measure import measure
+from ..model.reduction.measure import LEVEL_RANGE, measure
 from ..model.reduction.report import folded_json, folded_text
 from ..model.spread import spread_points
 from .own.connections import with_transformers
@@ -45,6 +45,7 @@ class _Work:
     lines: list[str] = field(default_factory=list)
     parts: dict[str, Any] = field(default_factory=dict)
     study: str | None = None
+    levels: tuple[float, float] = LEVEL_RANGE  #: of the loads, as a study will draw them
 
 
 def import_command(args: argparse.Namespace) -> int:
@@ -104,6 +105,11 @@ def _own_data(work: _Work, args: argparse.Namespace) -> None:
     if args.peaks is not None:
         work.feeder, measured, match = with_peaks(work.feeder, args.peaks)
         work.matches.append(match)
+        ends = [item.level.support for item in measured]
+        work.levels = (
+            min(low for low, _ in [*ends, work.levels]),
+            max(high for _, high in [*ends, work.levels]),
+        )
         if measured and args.output is not None:
             work.study = measured_study_text(measured, args.peaks.name)
     for match in work.matches:
@@ -114,7 +120,7 @@ def _fold(work: _Work) -> None:
     """Fold laterals and low voltage, and measure what that changes."""
     say("folding, and measuring what it changes")
     folded = fold(work.feeder)
-    measured = measure(work.feeder, folded, rng=np.random.default_rng(_SEED))
+    measured = measure(work.feeder, folded, rng=np.random.default_rng(_SEED), levels=work.levels)
     work.feeder = folded.feeder
     work.lines += ["", *folded_text(folded, measured)]
     work.parts["reduction"] = folded_json(folded, measured)
@@ -127,8 +133,9 @@ def _write(work: _Work, args: argparse.Namespace, imported: Imported) -> list[Pa
     folded = ", laterals and low voltage folded" if args.reduce else ""
     dropped = f", without {', '.join(imported.dropped)}" if imported.dropped else ""
     settled = ", taps where its controls settle" if args.solve_controls else ""
-    comment = f"Imported from {args.file.name} (OpenDSS){dropped}{settled}{folded}."
-    feeder = replace(work.feeder, imported_from=args.file.name)
+    changed = f"{dropped}{settled}{folded}"
+    comment = f"Imported from {args.file.name} (OpenDSS){changed}."
+    feeder = replace(work.feeder, imported_from=f"{args.file.name}{changed}")
     written = list(write_feeder(feeder, args.output, comment=comment))
     if work.study is not None:
         study = args.output.with_suffix(".study.toml")

@@ -37,6 +37,12 @@ from ..compiled import compiled, compiled_apart, compiled_door
 from ..states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from .assemble import set_admittances
 from .breaks import FLOATING, NOTHING_S, SINGULAR, squared
+from .corrections import (
+    can_correct,
+    climb_corrections,
+    leaps_to_take_apart,
+    set_corrections,
+)
 from .event_node import BELOW, climb_event, climb_loose, descend_event
 from .loops import carry_fill, climb_chord, descend_chord_event, hand_up
 from .matrix3 import (
@@ -58,6 +64,8 @@ from .settle import is_linear, positive, see_magnitudes, update_magnitudes
 from .turns import turn_edge
 
 __all__ = ["solve_block"]
+
+CORRECTED_PASSES = 12  #: what has not settled by then is eliminated in every pass
 
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
@@ -143,17 +151,6 @@ def is_sourced(tree: Tree) -> bool:
 
 
 @compiled
-def leaps_to_take_apart(tree: Tree, edge: int, far_node: int) -> tuple[int, int]:
-    """The leaps on whose edges or nodes something happens; -2: none."""
-    first = second = -2
-    if 0 <= edge < tree.passed.size:
-        first = max(tree.passed[edge], tree.leap[edge])
-    if far_node >= 0:
-        second = tree.passed[far_node]
-    return first if first >= 0 else -2, second if second >= 0 else -2
-
-
-@compiled
 def climb_leap(tree: Tree, work: Work, k: int, leap: int) -> None:
     """Eliminate all the edges of a leap at once, at whose end node k is."""
     a, above = tree.lone_phase[k], tree.leap_from[leap]
@@ -197,14 +194,16 @@ def lift_neutral(tree: Tree, work: Work) -> int:
 
 
 @compiled
-def descend(tree: Tree, state: State, work: Work, s: int) -> None:
-    """Voltages from the source to the leaves, and the stubs of the event node."""
+def descend(tree: Tree, state: State, work: Work, s: int, fed: bool) -> None:
+    """Voltages from the source to the leaves, and the stubs of the event node.
+
+    ``fed``: currents are fed in that no voltage drives.
+    """
     parents, in_loop, lone, phases = tree.parent, tree.in_loop, tree.lone_phase, tree.phases
     v_all, f_all, fork = work.v, work.f, tree.fork
     passed, leaps = tree.passed, tree.leap
     edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
     last = parents.size
-    sourced = is_sourced(tree)
     needed, needed_too = leaps_to_take_apart(tree, edge, state.far_node[s])
     for k in range(last):
         leap = passed[k]
@@ -216,6 +215,8 @@ def descend(tree: Tree, state: State, work: Work, s: int) -> None:
         a = lone[k]
         if a >= 0 and k != edge:
             v_all[k, a] = f_all[k, a, a] * v_all[parent, a]
+            if fed:
+                v_all[k, a] += work.h_j[k, a]
             continue
         above = load_vector(v_all, parent if k else last)
         carried = tree.carried[k]
@@ -227,7 +228,7 @@ def descend(tree: Tree, state: State, work: Work, s: int) -> None:
             v = times(load(f_all, k), above)
             if in_loop[k]:
                 v = per_fork(work.h[k], carried, fork, v_all, v)
-            if sourced:
+            if fed:
                 v = plus(v, load_vector(work.h_j, k))
         store_vector(v_all, k, v)
         if tree.node_phases[k] != 7:
@@ -248,8 +249,14 @@ def keep_phases(v: Complex, k: int, phases: int) -> None:
 
 
 @compiled
-def edge_current(tree: Tree, state: State, work: Work, s: int, k: int, below: bool) -> Vector:
-    """Current from above into edge k, or ``below``: out of its lower end."""
+def edge_current(
+    tree: Tree, state: State, work: Work, s: int, where: tuple[int, bool, bool]
+) -> Vector:
+    """Current from above into an edge, or below: out of its lower end.
+
+    ``where`` is the edge, whether below, and whether currents are fed in.
+    """
+    k, below, fed = where
     parents, v_all, edge, share = tree.parent, work.v, state.edge[s], state.share[s]
     last = parents.size
     if k >= last:
@@ -266,11 +273,14 @@ def edge_current(tree: Tree, state: State, work: Work, s: int, k: int, below: bo
         upper, lower = parents[k] if k else last, k
         carried = tree.carried[k]
         if below and (tree.regulator[k] >= 0 or tree.transformer[k] >= 0):
-            current = plus(times(load(work.y, k), load_vector(v_all, k)), load_vector(work.y_j, k))
+            current = times(load(work.y, k), load_vector(v_all, k))
+            if fed:
+                current = plus(current, load_vector(work.y_j, k))
             current = per_fork(work.x_low[k], carried, tree.fork, v_all, current)
         else:
             current = times(load(work.w, k), load_vector(v_all, upper))
-            current = plus(current, load_vector(work.x_j, k))
+            if fed:
+                current = plus(current, load_vector(work.x_j, k))
             current = per_fork(work.x[k], carried, tree.fork, v_all, current)
             if k == edge and below:
                 for n in range(2):
@@ -316,17 +326,25 @@ def solve_block(
         for n in range(winding_v_pu.size):
             winding_v_pu[n] = winding_out[n, s]
             history[0, n] = history[1, n] = 0.0
-        settled = False
+        correctable = not linear and can_correct(tree, state, s)
+        settled = fed = False
         flags = 0
         passes = 0
         while not settled and passes < most_passes:
             passes += 1
-            set_admittances(tree, state, work, s, floor_pu)
-            flags = climb(tree, state, work, s)
+            corrected = correctable and 1 < passes <= CORRECTED_PASSES
+            if corrected:
+                corrected = set_corrections(tree, state, work, s, floor_pu)
+            if corrected:
+                climb_corrections(tree, state, work, s)
+            else:
+                set_admittances(tree, state, work, s, floor_pu)
+                flags = climb(tree, state, work, s)
             store_vector(v, last, (emf, emf * turn, emf * turn.conjugate()))
             if tree.lifted:
                 flags |= lift_neutral(tree, work)
-            descend(tree, state, work, s)
+            fed = corrected or is_sourced(tree)
+            descend(tree, state, work, s, fed)
             settled = linear or update_magnitudes(tree, state, work, s, passes) <= tolerance_pu
         if linear:
             see_magnitudes(tree, state, work, s)
@@ -339,7 +357,7 @@ def solve_block(
         for n in range(winding_v_pu.size):
             winding_out[n, s] = winding_v_pu[n]
         for n in range(i_edge.size):
-            current = edge_current(tree, state, work, s, i_edge[n], i_below[n])
+            current = edge_current(tree, state, work, s, (i_edge[n], i_below[n], fed))
             for i in range(3):
                 i_out[n, i, s] = current[i]
         for i in range(3):

@@ -12,6 +12,7 @@ from ...model.distributions import Choices
 from ...model.events.base import Places, places_on
 from ...model.leaps import with_leaps
 from ...model.network import CONNECTIONS, Network, compile_network
+from ...model.neutrals import wires_at_unknown
 from ...model.parts import Feeder
 from ...model.points import Points, find_points, point_probes
 from ...model.sides import edge_nodes
@@ -132,7 +133,7 @@ def _case(
     ties = _others(feeder, study, study.events.tie_switching.states, wired)
     transfers = _others(feeder, study, study.events.transfer.states, wired)
     unknown = [n for n, unit in enumerate(feeder.transformers) if unit.connection == "unknown"]
-    choices = study.transformers.unknown or UNKNOWN_CONNECTION[feeder.source.wires]
+    choices = study.transformers.unknown or UNKNOWN_CONNECTION[wires_at_unknown(feeder)]
     return Case(
         feeder=feeder,
         study=study,

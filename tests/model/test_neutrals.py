@@ -8,8 +8,9 @@ from typing import get_args
 import pytest
 
 from openphase.model import load_feeder
-from openphase.model.neutrals import bus_neutrals
-from openphase.model.parts import InlineConnection, InlineTransformer
+from openphase.model.network import CONNECTIONS, compile_network
+from openphase.model.neutrals import bus_neutrals, wires_at_unknown
+from openphase.model.parts import InlineConnection, InlineTransformer, Place
 
 EARTHED = {"Yg/Yg", "Y/Yg", "D/Yg"}
 
@@ -50,3 +51,20 @@ def test_a_single_winding_has_one_where_it_lies_to_earth(
     paper = load_feeder("paper")
     own = replace(unit(connection, "a", to), from_bus=paper.source.bus)
     assert bus_neutrals(replace(paper, inline_transformers=(own,)))["beyond"] == neutral
+
+
+@pytest.mark.parametrize(("connection", "wires"), [("D/D", 3), ("Yg/Yg", 4)])
+def test_a_unit_behind_a_delta_is_never_taken_as_a_grounded_wye(
+    connection: InlineConnection, wires: int
+) -> None:
+    paper = load_feeder("paper")
+    own = replace(unit(connection), from_bus=paper.source.bus)
+    hung = replace(paper.transformers[0], place=Place(bus="beyond"), connection="unknown")
+    feeder = replace(
+        paper, inline_transformers=(own,), transformers=(hung, *paper.transformers[1:])
+    )
+    assert wires_at_unknown(paper) == paper.source.wires == 4
+    assert wires_at_unknown(feeder) == wires
+    network = compile_network(feeder)
+    assumed = {3: "D/Yg", 4: "Yg/Yg"}[wires]
+    assert network.connection[network.units.index(hung.name)] == CONNECTIONS[assumed]
