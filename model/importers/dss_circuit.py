@@ -77,7 +77,7 @@ def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) ->
             engine, "capacitor", partial(_capacitor, frequency_hz=float(solution.Frequency))
         ),
         reactors=_each(engine, "reactor", partial(_reactor, engine)),
-        plants=_each_of(engine, _PLANTS, _plant),
+        plants=_each_of(engine, _PLANTS, partial(_plant, gen_mult=float(solution.GenMult))),
         guards=_each_of(engine, _GUARDS, _guard),
         tap_controls=_each(engine, "regcontrol", _tap_control),
         cap_controls=_each(engine, "capcontrol", _name),
@@ -244,8 +244,8 @@ def _at_frequency(engine: Engine, row: Props) -> tuple[Matrix, Matrix]:
     """
     size = int(row["phases"])
     y = _own_admittances(engine, f"line.{_name(row)}")
-    z = np.linalg.inv(-y[:size, size:]) / float(row["length"])
-    z = (z + z.T) / 2.0
+    own = np.linalg.inv(-y[:size, size:]) / float(row["length"])
+    z = np.asarray((own + own.T) / 2.0)
     return _matrix(z.real), _matrix(z.imag)
 
 
@@ -332,9 +332,10 @@ def _capacitor(row: Props, frequency_hz: float) -> RawCapacitor:
     branch_kv = kv / 3.0**0.5 if phases > 1 and not delta else kv
     # microfarads are what counts: the engine makes them of kvar in its own way
     kvar_of_uf = 2.0e-3 * math.pi * frequency_hz * branch_kv**2 * phases
+    conductors = phases + 1 if delta and phases < 3 else phases
     return RawCapacitor(
         name=_name(row),
-        end=end_of(row["bus1"], phases, phases),
+        end=end_of(row["bus1"], conductors, phases),
         far=end_of(row["bus2"] or "", phases, phases),
         phases=phases,
         delta=delta,
@@ -364,11 +365,13 @@ def _reactor(engine: Engine, row: Props) -> RawReactor:
     )
 
 
-def _plant(kind: str, row: Props) -> RawPlant:
+def _plant(kind: str, row: Props, *, gen_mult: float) -> RawPlant:
     kw, kvar = float(row["kw"]) if "kw" in row else 0.0, float(row["kvar"])
     if kind == "pvsystem":
         made = float(row["pmpp"]) * float(row["irradiance"]) * float(row["%pmpp"]) / 100.0
         kw = min(made, float(row["kva"]))
+    if kind == "generator" and str(row["status"]).lower() != "fixed":
+        kw, kvar = kw * gen_mult, kvar * gen_mult
     phases = int(row["phases"])
     return RawPlant(
         kind=kind,

@@ -171,9 +171,7 @@ def capacitor_of(
     kvar = sum(step for step, state in zip(raw.kvar, raw.states, strict=False) if state)
     kv, nodes, far = raw.kv, raw.end.nodes, raw.far
     if raw.delta:
-        ring = range(raw.phases)
-        far_nodes = [nodes[(n + 1) % raw.phases] if raw.phases > 1 else far.nodes[0] for n in ring]
-        pairs = list(zip(nodes, far_nodes, strict=True))
+        pairs = [(nodes[n], nodes[(n + 1) % len(nodes)]) for n in range(raw.phases)]
     else:
         kv = kv / 3.0**0.5 if raw.phases > 1 else kv
         pairs = list(zip(nodes, far.nodes, strict=True))
@@ -216,7 +214,10 @@ def der_of(
     raw: RawPlant, live: Collection[Node], buses: Names, names: Names, findings: Findings
 ) -> list[Der]:
     """Return the distributed generation that a three-phase plant is."""
-    if raw.kw <= 0.0:
+    if raw.kw < 0.0:
+        findings.add(raw.kind, raw.name, "refused", "it charges: give a load instead")
+        return []
+    if raw.kw == 0.0:
         findings.add(raw.kind, raw.name, "state kept", "delivers nothing: left out")
         return []
     if not any((raw.end.bus, node) in live for node in raw.end.nodes):

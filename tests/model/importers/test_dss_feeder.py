@@ -231,6 +231,26 @@ def test_matrices_of_another_frequency_take_the_earth_with_them(tmp_path: Path) 
     assert max(row.largest_pu for row in differences(found)) < 1e-6
 
 
+@needs_engine
+def test_capacitors_between_two_phases_agree(tmp_path: Path) -> None:
+    found = imported(
+        tmp_path,
+        "new capacitor.one bus1=m.3.1 phases=1 conn=delta kv=12.47 kvar=100",
+        "new capacitor.two bus1=m.2 bus2=m.3 phases=1 kv=12.47 kvar=70",
+        "new capacitor.three bus1=m.1.2.3 phases=2 conn=delta kv=12.47 kvar=90",
+    )
+    agree(found, 1e-6)
+
+
+@needs_engine
+def test_generation_takes_the_multiplier_and_what_charges_is_refused(tmp_path: Path) -> None:
+    plants = [f"new generator.{name} bus1=m kv=12.47 kw=500 pf=0.9" for name in ("v", "f")]
+    found = imported(tmp_path, *plants, "edit generator.f status=fixed", "set genmult=0.4")
+    assert [(der.name, der.kw) for der in found.feeder.ders] == [("v", 200.0), ("f", 500.0)]
+    with pytest.raises(InputError, match="it charges"):
+        imported(tmp_path, "new storage.s bus1=m kv=12.47 kwrated=90 kwhrated=200 state=charging")
+
+
 @pytest.mark.parametrize(
     ("more", "wanted"),
     [("bus2=s.4.4.4", "bus2 must be earth"), ("sequence=neg", "sequence must be pos")],
