@@ -12,7 +12,7 @@ import numpy as np
 
 from ..model.errors import InputError
 from ..model.importers.dss_feeder import Imported, import_opendss
-from ..model.importers.fidelity import differences
+from ..model.importers.fidelity import Difference, differences
 from ..model.importers.report import fidelity_report
 from ..model.importers.report_text import report_markdown, report_text
 from ..model.parts import Feeder
@@ -35,6 +35,9 @@ __all__ = ["import_command"]
 _SEED = 1
 """Of the scenarios on which a reduction is measured."""
 
+WORTH_A_WARNING_PU = 1e-3
+"""A difference to OpenDSS's own voltages that is more than what either approximates."""
+
 
 @dataclass(slots=True, kw_only=True)
 class _Work:
@@ -54,7 +57,8 @@ def import_command(args: argparse.Namespace) -> int:
     say(f"reading {args.file}")
     imported = import_opendss(args.file, drop=args.drop, solve_controls=args.solve_controls)
     say(f"{len(imported.feeder.lines)} lines, {len(imported.feeder.loads)} loads; solving")
-    report = fidelity_report(imported, differences(imported))
+    found = differences(imported)
+    report = fidelity_report(imported, found)
     work = _Work(feeder=imported.feeder)
     _own_data(work, args)
     if args.reduce:
@@ -68,8 +72,19 @@ def import_command(args: argparse.Namespace) -> int:
         written.append(args.report)
     for path in written:
         say(f"wrote {path}")
+    _warn(found)
     print(as_json(report) if args.json else _page(text), end="")
     return 0
+
+
+def _warn(found: Sequence[Difference]) -> None:
+    """Say what the table of differences shows only to those who read it."""
+    for row in found:
+        if row.largest_pu > WORTH_A_WARNING_PU:
+            say(
+                f"warning: {row.mode}: {row.largest_pu:.1e} pu from OpenDSS's own voltages at "
+                f"{row.bus} {row.phase}: find out why before you rely on this feeder"
+            )
 
 
 def _check_outputs(args: argparse.Namespace) -> None:

@@ -226,6 +226,9 @@ def der_of(
     if raw.phases != 3 or not all((raw.end.bus, node) in live for node in (1, 2, 3)):
         findings.add(raw.kind, raw.name, "refused", f"{raw.phases}-phase generation")
         return []
+    if raw.kind == "generator" and raw.model == 3:
+        findings.add(raw.kind, raw.name, "refused", "it holds its voltage (model 3)")
+        return []
     factor = raw.kw / (raw.kw**2 + raw.kvar**2) ** 0.5
     findings.add(raw.kind, raw.name, "approximated", "constant power of the positive sequence")
     return [
