@@ -15,6 +15,9 @@ CODE := pyproject.toml README.md LICENSE __init__.py py.typed \
 PYTHON ?=
 PYTHONS := $(or $(PYTHON),python3 python3.13 python3.12 python3.11 python3.14 python)
 
+# Optional parts that tests and linters see: make test EXTRAS= leaves them out.
+EXTRAS ?= opendss
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench clean
@@ -68,14 +71,14 @@ import sys, tomllib
 house = tomllib.load(open("pyproject.toml", "rb"))
 extras = house["project"]["optional-dependencies"]
 needs = house["build-system"]["requires"] + house["project"]["dependencies"]
-for extra in {"run": [], "test": ["test"], "dev": ["test", "dev"]}[sys.argv[1]]:
+for extra in {"run": [], "test": ["test"], "dev": ["test", "dev"]}[sys.argv[1]] + sys.argv[2:]:
     needs += [need for need in extras[extra] if not need.startswith("openphase[")]
 print(*needs, sep="\n")
 endef
 export LIST_NEEDS
 
 $(VENV)/needs-%: pyproject.toml constraints.txt | $(VENV)/made
-	@$(BIN)/python -c "$$LIST_NEEDS" $* > $@.txt
+	@$(BIN)/python -c "$$LIST_NEEDS" $* $(if $(filter run,$*),,$(EXTRAS)) > $@.txt
 	$(PIP) install -c constraints.txt -r $@.txt
 	@touch $@
 

@@ -70,13 +70,14 @@ def solve_after(
 def _overvoltage(network: Network, answer: Answer) -> NDArray[np.bool_]:
     """(S,) any DER stands above its limit.
 
-    On three wires it has no neutral, and does not notice that of the network moving: there it
-    is the positive sequence that counts.
+    Where no neutral goes with the lines a DER has none either, and does not notice that of the
+    network moving: there it is the positive sequence that counts.
     """
     units = network.machines.unit[network.machines.motor_load.size :]
-    windings = unit_voltages(answer, len(network.units))
-    seen = slice(3, 4) if network.three_wire else slice(0, 3)
-    return np.asarray(windings[units, seen].max(axis=(0, 1)) > OVERVOLTAGE_PU)
+    v_pu = unit_voltages(answer, len(network.units))[units]
+    own = network.neutral[network.tree.unit_node[units]][:, None]
+    seen = np.where(own, v_pu[:, :3].max(axis=1), v_pu[:, 3])
+    return np.asarray(seen.max(axis=0) > OVERVOLTAGE_PU)
 
 
 def _some(state: State, chosen: NDArray[np.int64]) -> State:

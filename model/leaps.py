@@ -73,7 +73,7 @@ def _bare(tree: Tree, probes: Probes) -> NDArray[np.bool_]:
     for busy in (tree.unit_node, tree.branch_node, tree.fork, tree.tail, probes.v_node, seen):
         bare[busy] = False
     bare[0] = False
-    return bare
+    return np.asarray(bare)
 
 
 def _twigs(tree: Tree, bare: NDArray[np.bool_]) -> tuple[dict[int, int], dict[int, Complex]]:
@@ -102,7 +102,7 @@ def _passable(tree: Tree, bare: NDArray[np.bool_]) -> NDArray[np.bool_]:
         turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
         if turned or tree.loose_from[k + 1] > tree.loose_from[k] or tree.in_loop[k]:
             passable[tree.parent[k]] = False
-    return passable
+    return np.asarray(passable)
 
 
 def _capacitors(tree: Tree) -> NDArray[np.bool_]:

@@ -203,6 +203,7 @@ def compile_network(
         emf_turn=complex(np.cos(angle), np.sin(angle)),
     )
     tree.z_ohm[0] = phase_matrix(source.z0_ohm, source.z1_ohm, source.z2_ohm)
+    assumed = assumed_connection(feeder)
     return Network(
         tree=tree,
         nodes=tuple(order),
@@ -211,7 +212,7 @@ def compile_network(
         length_km=np.array([p.length_km if p else 0.0 for p in edge_pieces]),
         units=tuple(unit.name for unit in units),
         loads=tuple(load.name for load in feeder.loads),
-        connection=np.array([connection_of(feeder, unit) for unit in units], np.int64),
+        connection=np.array([connection_of(unit, assumed) for unit in units], np.int64),
         exponent=own_exponents(feeder),
         machines=machines,
         **regulator_arrays(feeder, edge_pieces, edges.upward),

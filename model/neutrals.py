@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 
-from .parts import Feeder, InlineTransformer, Line, Regulator, Switch
+from .parts import Feeder, InlineTransformer, Line, Regulator, Switch, Transformer
 
-__all__ = ["bus_neutrals"]
+__all__ = ["bus_neutrals", "wires_at_unknown"]
 
 
 def bus_neutrals(feeder: Feeder) -> dict[str, bool]:
@@ -35,6 +35,25 @@ def bus_neutrals(feeder: Feeder) -> dict[str, bool]:
                 found[far] = found[bus] if makes is None else makes
                 waiting.append(far)
     return found
+
+
+def wires_at_unknown(feeder: Feeder) -> int:
+    """4 where a neutral goes to every transformer of unknown connection, else 3.
+
+    One behind a winding between phases can be no grounded wye, whatever the source is.
+    """
+    unknown = [unit for unit in feeder.transformers if unit.connection == "unknown"]
+    if not unknown:
+        return feeder.source.wires
+    neutral = bus_neutrals(feeder)
+    line_bus = {line.name: line.from_bus for line in feeder.lines}
+
+    def has_neutral(unit: Transformer) -> bool:
+        place = unit.place
+        bus = place.bus if place.line is None else line_bus[place.line]
+        return bus is not None and neutral.get(bus, False)
+
+    return 4 if all(map(has_neutral, unknown)) else 3
 
 
 def _earthed(unit: InlineTransformer, *, to_side: bool) -> bool:

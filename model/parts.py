@@ -171,7 +171,7 @@ class Transformer:
     (on the rating) between the halves of a Yg/Yg unit with a three-limb core; None: no such branch.
     ``xm_pu`` is the magnetizing reactance there, of every sequence and connection; None: infinite.
     An unknown connection is drawn by a study; without one it counts as the commonest for the
-    feeder's wires (``network.assumed_connection``).
+    wires at its place (``network.assumed_connection``).
     """
 
     name: str

@@ -166,9 +166,15 @@ def pieces_of(feeder: Feeder, closed: frozenset[str], opened: frozenset[str]) ->
         mask = phase_mask(conductors(part) if isinstance(part, Regulator) else part.phases)
         name = part.name if isinstance(part, Regulator) else None
         ends = (part.from_bus, part.to_bus)
-        drop = isinstance(part, Regulator) and part.z_ohm != 0.0
+        drop = isinstance(part, Regulator) and _drops(part)
         pieces.append(_without_length(ends, (mask, mask), regulator=name, has_drop=drop))
     return pieces + _banks(feeder)
+
+
+def _drops(regulator: Regulator) -> bool:
+    """Whether all its conductors have impedance, that which goes through included."""
+    through = regulator.reference in ("a", "b", "c")
+    return regulator.z_ohm != 0.0 and (regulator.jumper_ohm != 0.0 or not through)
 
 
 def _without_length(

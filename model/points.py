@@ -17,7 +17,7 @@ from .sides import joined, sides_of
 from .states import Probes
 from .topology import Edge, edges, shortest_path
 
-__all__ = ["Points", "Terminal", "find_points", "into_line", "point_probes"]
+__all__ = ["Points", "Terminal", "fed_by_its_points", "find_points", "into_line", "point_probes"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,6 +89,30 @@ def find_points(feeder: Feeder, network: Network, opened: frozenset[str] = froze
         below=np.array([below for _, below in ends], np.bool_),
         terminals=tuple(terminals),
     )
+
+
+def fed_by_its_points(feeder: Feeder) -> tuple[tuple[Section, ...], tuple[str, ...]]:
+    """Return the sections that `find_points` takes, and a sentence for each of the others.
+
+    Of a feeder that makes no network all are returned.
+    """
+    if not feeder.sections:
+        return (), ()
+    try:
+        state = _state(feeder, compile_network(feeder), frozenset())
+    except InputError:
+        return feeder.sections, ()
+    taken: list[Section] = []
+    left_out: list[str] = []
+    for section in feeder.sections:
+        try:
+            _terminals(state, section)
+        except InputError as error:
+            why = error.faults[0].found
+            left_out.append(f"no section between {section.local} and {section.remote}: {why}")
+        else:
+            taken.append(section)
+    return tuple(taken), tuple(left_out)
 
 
 def _voltage_node(point: Point, opened: frozenset[str]) -> str:

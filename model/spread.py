@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 
 from .parts import Feeder, Point
+from .points import fed_by_its_points
 from .trunk import Step, Trunk, find_trunk
 from .zones import adjacent_sections, zones_of
 
@@ -59,8 +60,15 @@ def spread_points(feeder: Feeder, count: int = 4) -> Spread:
     points = _points(trunk.steps, between)
     sections, left_out = adjacent_sections(feeder, points)
     spread = replace(feeder, points=points, sections=sections)
+    sections, not_fed = fed_by_its_points(spread)
+    spread = replace(spread, sections=sections)
     inside = _inside(spread)
-    said = (*_said(trunk, points, count, 2 + len(between)), *left_out, *_said_of_regulators(inside))
+    said = (
+        *_said(trunk, points, count, 2 + len(between)),
+        *left_out,
+        *not_fed,
+        *_said_of_regulators(inside),
+    )
     return Spread(feeder=spread, said=said, inside=inside)
 
 

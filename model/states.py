@@ -176,6 +176,7 @@ class Work(NamedTuple):
     v: Complex  #: (B + 1, 3); the last row is the EMF
     g: Complex  #: (U, 3, 3) winding voltage per bus voltage
     g_j: Complex  #: (U, 3)
+    branch_y: Complex  #: (P,) as last eliminated
     unit_y: Complex  #: (U, 3, 3) across the LV windings
     unit_j: Complex  #: (U, 3) fed in there
     event_y: Complex  #: (2, 3, 3) shunts at p and q
@@ -217,6 +218,7 @@ def workspace(tree: Tree) -> Work:
         v=zeros(nodes + 1, 3),
         g=zeros(units, 3, 3),
         g_j=zeros(units, 3),
+        branch_y=zeros(tree.branch_node.size),
         unit_y=zeros(units, 3, 3),
         unit_j=zeros(units, 3),
         event_y=zeros(2, 3, 3),

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from .inline import regulator_ratio, regulator_reference
 from .machines import Machines, has_motor, load_va
-from .parts import Capacitor, Der, Feeder, Load, Source, Transformer
+from .neutrals import wires_at_unknown
+from .parts import Capacitor, Der, Feeder, Load, Transformer
 from .phases import phase_mask, phase_rows
 from .pieces import Piece, node_name
 from .solver.bank import D_D, D_YG, Y_D, YG_D, YG_YG
@@ -39,9 +40,9 @@ CONNECTIONS: dict[str, int] = {
 }
 
 
-def assumed_connection(source: Source) -> str:
+def assumed_connection(feeder: Feeder) -> str:
     """What an unknown winding connection counts as, until a study draws it."""
-    return "Yg/Yg" if source.wires == 4 else "D/Yg"
+    return "Yg/Yg" if wires_at_unknown(feeder) == 4 else "D/Yg"
 
 
 Unit = Transformer | Load | Der
@@ -97,11 +98,13 @@ def unit_arrays(
     }
 
 
-def connection_of(feeder: Feeder, unit: Unit) -> int:
-    """Winding connection; what hangs on the feeder directly is a bank without leakage."""
+def connection_of(unit: Unit, assumed: str) -> int:
+    """Winding connection; what hangs on the feeder directly is a bank without leakage.
+
+    ``assumed`` is that of a transformer whose connection is unknown.
+    """
     if isinstance(unit, Transformer):
-        known = unit.connection != "unknown"
-        return CONNECTIONS[unit.connection if known else assumed_connection(feeder.source)]
+        return CONNECTIONS[assumed if unit.connection == "unknown" else unit.connection]
     return D_YG if isinstance(unit, Load) and unit.connection == "delta" else YG_YG
 
 

@@ -48,7 +48,7 @@ from .run.store import RunFolder, as_json
 from .settings_file import SettingsSheet, read_sheet
 from .show.report import write_report
 from .show.sheet import settings_csv, sheet_table
-from .spec.study_file import Study, dump_study
+from .spec.study_file import Study, dump_study, resolved
 
 __all__ = ["REFERENCE", "Assessment", "assess_command", "assess_feeder"]
 
@@ -195,7 +195,7 @@ def _begin(
     if reserve(book, *entry) != attempt:
         raise OpenPhaseError(f"{book}: another run took the attempt meanwhile; start again")
     folder.begin(made_from)
-    folder.write("study.toml", dump_study(study))
+    folder.write("study.toml", dump_study(resolved(study, feeder)))
     folder.log(
         f"assess {feeder.name}, seed {attempt.seed}, attempt {attempt.number}, "
         f"n {attempt.scenarios}"

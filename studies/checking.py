@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..model.errors import InputError, OpenPhaseError
 from ..model.events.phases import count_phases
 from ..model.network import Network, assumed_connection, compile_network
+from ..model.neutrals import wires_at_unknown
 from ..model.parts import Der, Feeder, InlineTransformer, Load, Place, Regulator, Switch
 from ..model.points import Terminal, find_points
 from ..model.reading.provenance import assumptions, count_origins
@@ -90,6 +91,7 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
     units = [unit for unit in feeder.transformers if inside.holds(unit.place)]
     behind = {unit.name for unit in units}
     inline = [unit for unit in feeder.inline_transformers if inside.joins(unit)]
+    earthed = wires_at_unknown(feeder) == 4
 
     def hanging(parts: Iterable[Load | Der]) -> list[str]:
         return [p.name for p in parts if p.transformer in behind or inside.holds(p.place)]
@@ -108,10 +110,8 @@ def _section(feeder: Feeder, network: Network, terminal: Terminal, study: Study)
             *(unit.name for unit in inline if unit.connection == "Yg/D"),
         ],
         "yg_d_sampled": [unit.name for unit in units if unit.name in study.transformers.yg_d],
-        # on three wires an unknown unit has no neutral to be Yg by
-        "yg_d_unknown": [
-            unit.name for unit in units if unit.connection == "unknown" and feeder.source.wires == 4
-        ],
+        # without a neutral an unknown unit cannot be Yg
+        "yg_d_unknown": [unit.name for unit in units if unit.connection == "unknown" and earthed],
         "loads": hanging(feeder.loads),
         "ders": hanging(feeder.ders),
         "capacitors": [bank.name for bank in feeder.capacitors if inside.holds(bank.place)],
@@ -196,7 +196,7 @@ def _assumed(feeder: Feeder) -> list[str]:
     if any(unit.connection == "unknown" for unit in feeder.transformers):
         said.append(
             "transformers of unknown connection are drawn by a study; until then they count as "
-            f"{assumed_connection(feeder.source)}"
+            f"{assumed_connection(feeder)}"
         )
     if any(li.code is None and li.z0_ohm_per_km == li.z1_ohm_per_km for li in feeder.lines):
         said.append("some lines have z0 = z1 (given so): overhead lines have z0 ≈ 3 z1")

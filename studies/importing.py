@@ -12,13 +12,13 @@ import numpy as np
 
 from ..model.errors import InputError
 from ..model.importers.dss_feeder import Imported, import_opendss
-from ..model.importers.fidelity import differences
+from ..model.importers.fidelity import Difference, differences
 from ..model.importers.report import fidelity_report
 from ..model.importers.report_text import report_markdown, report_text
 from ..model.parts import Feeder
 from ..model.reading.feeder_file import write_feeder
 from ..model.reduction.fold import fold
-from ..model.reduction.measure import measure
+from ..model.reduction.measure import LEVEL_RANGE, measure
 from ..model.reduction.report import folded_json, folded_text
 from ..model.spread import spread_points
 from .own.connections import with_transformers
@@ -35,6 +35,9 @@ __all__ = ["import_command"]
 _SEED = 1
 """Of the scenarios on which a reduction is measured."""
 
+WORTH_A_WARNING_PU = 1e-3
+"""A difference to OpenDSS's own voltages that is more than what either approximates."""
+
 
 @dataclass(slots=True, kw_only=True)
 class _Work:
@@ -45,6 +48,7 @@ class _Work:
     lines: list[str] = field(default_factory=list)
     parts: dict[str, Any] = field(default_factory=dict)
     study: str | None = None
+    levels: tuple[float, float] = LEVEL_RANGE  #: of the loads, as a study will draw them
 
 
 def import_command(args: argparse.Namespace) -> int:
@@ -53,7 +57,8 @@ def import_command(args: argparse.Namespace) -> int:
     say(f"reading {args.file}")
     imported = import_opendss(args.file, drop=args.drop, solve_controls=args.solve_controls)
     say(f"{len(imported.feeder.lines)} lines, {len(imported.feeder.loads)} loads; solving")
-    report = fidelity_report(imported, differences(imported))
+    found = differences(imported)
+    report = fidelity_report(imported, found)
     work = _Work(feeder=imported.feeder)
     _own_data(work, args)
     if args.reduce:
@@ -67,8 +72,19 @@ def import_command(args: argparse.Namespace) -> int:
         written.append(args.report)
     for path in written:
         say(f"wrote {path}")
+    _warn(found)
     print(as_json(report) if args.json else _page(text), end="")
     return 0
+
+
+def _warn(found: Sequence[Difference]) -> None:
+    """Say what the table of differences shows only to those who read it."""
+    for row in found:
+        if row.largest_pu > WORTH_A_WARNING_PU:
+            say(
+                f"warning: {row.mode}: {row.largest_pu:.1e} pu from OpenDSS's own voltages at "
+                f"{row.bus} {row.phase}: find out why before you rely on this feeder"
+            )
 
 
 def _check_outputs(args: argparse.Namespace) -> None:
@@ -104,6 +120,11 @@ def _own_data(work: _Work, args: argparse.Namespace) -> None:
     if args.peaks is not None:
         work.feeder, measured, match = with_peaks(work.feeder, args.peaks)
         work.matches.append(match)
+        ends = [item.level.support for item in measured]
+        work.levels = (
+            min(low for low, _ in [*ends, work.levels]),
+            max(high for _, high in [*ends, work.levels]),
+        )
         if measured and args.output is not None:
             work.study = measured_study_text(measured, args.peaks.name)
     for match in work.matches:
@@ -114,7 +135,7 @@ def _fold(work: _Work) -> None:
     """Fold laterals and low voltage, and measure what that changes."""
     say("folding, and measuring what it changes")
     folded = fold(work.feeder)
-    measured = measure(work.feeder, folded, rng=np.random.default_rng(_SEED))
+    measured = measure(work.feeder, folded, rng=np.random.default_rng(_SEED), levels=work.levels)
     work.feeder = folded.feeder
     work.lines += ["", *folded_text(folded, measured)]
     work.parts["reduction"] = folded_json(folded, measured)
@@ -127,13 +148,16 @@ def _write(work: _Work, args: argparse.Namespace, imported: Imported) -> list[Pa
     folded = ", laterals and low voltage folded" if args.reduce else ""
     dropped = f", without {', '.join(imported.dropped)}" if imported.dropped else ""
     settled = ", taps where its controls settle" if args.solve_controls else ""
-    comment = f"Imported from {args.file.name} (OpenDSS){dropped}{settled}{folded}."
-    feeder = replace(work.feeder, imported_from=args.file.name)
+    changed = f"{dropped}{settled}{folded}"
+    comment = f"Imported from {args.file.name} (OpenDSS){changed}."
+    feeder = replace(work.feeder, imported_from=f"{args.file.name}{changed}")
     written = list(write_feeder(feeder, args.output, comment=comment))
+    study = args.output.with_suffix(".study.toml")
     if work.study is not None:
-        study = args.output.with_suffix(".study.toml")
         study.write_text(work.study, encoding="utf-8")
         written.append(study)
+    elif study.exists():
+        say(f"{study} is older and still goes with this feeder: remove it if it should not")
     return written
 
 

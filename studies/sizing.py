@@ -38,7 +38,7 @@ from .run.store import RunFolder, as_json, npz, pack
 from .run.tally import Trained, train_block
 from .show.report import write_report
 from .show.sheet import settings_csv, sheet_table
-from .spec.study_file import Study, dump_study
+from .spec.study_file import Study, dump_study, resolved
 
 __all__ = ["Sizing", "size_command", "size_feeder"]
 
@@ -127,7 +127,7 @@ def _begin(cases: Sequence[Case], demand: Demand, out: Path) -> tuple[RunFolder,
     announce(cases, folder, manifest(command, feeder, study, likely), likely, demand, purposes)
     attempt = reserve(book, *entry)
     folder.begin(manifest(command, feeder, study, attempt))
-    folder.write("study.toml", dump_study(study))
+    folder.write("study.toml", dump_study(resolved(study, feeder)))
     folder.log(
         f"size {feeder.name}, seed {attempt.seed}, attempt {attempt.number}, n {attempt.scenarios}"
     )

@@ -76,6 +76,8 @@ def _read(request: tuple[Script, str]) -> tuple[RawCircuit, str]:
     script, source = request
     engine = start(script.commands, source)
     with refusals_told(engine):
+        # Until it has needed them, the engine tells default matrices for lines without a code.
+        tell(engine, ("CalcVoltageBases",))
         return read_circuit(engine, script.coordinates), version(engine)
 
 

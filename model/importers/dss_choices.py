@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -150,7 +151,7 @@ def raise_refusals(circuit: RawCircuit, findings: Findings, source: str) -> None
         if weighed and len(rows) > 1:
             shares = (f"{row.name} {_share(circuit, [row.element], total)}" for row in rows)
             each = f" ({', '.join(shares)})"
-        drops = " ".join(f"--drop {_quoted(row.element)}" for row in rows)
+        drops = " ".join(f"--drop {shlex.quote(row.element)}" for row in rows)
         rule = f"cannot be imported: {why}; without it {lost} of the load goes{each}; {drops}"
         faults.append(Fault(source=source, line=None, where=f"{kind} {names}{more}", wanted=rule))
     if len(groups) > 1:
@@ -163,7 +164,3 @@ def raise_refusals(circuit: RawCircuit, findings: Findings, source: str) -> None
 def _share(circuit: RawCircuit, elements: Collection[str], total: float) -> str:
     lost = total - fed_kw(circuit, set(elements))
     return f"{lost:.1f} kW, {100.0 * lost / total if total else 0.0:.1f} %"
-
-
-def _quoted(element: str) -> str:
-    return f"'{element}'" if any(letter in element for letter in " ()&;'\"*$") else element

@@ -9,9 +9,10 @@ from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import Fault, InputError
-from .dss_engine import Engine, Props, count_of, rows_of
+from .dss_engine import Engine, Props, count_of, rows_of, tell
 from .dss_records import (
     End,
     Matrix,
@@ -62,6 +63,7 @@ _UNREAD = (
 
 def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) -> RawCircuit:
     """Return what the engine's circuit is made of, disabled elements left out."""
+    _let_switches_act(engine)
     solution = engine.circuit.Solution
     circuit = RawCircuit(
         name=str(engine.circuit.Name),
@@ -75,7 +77,7 @@ def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) ->
             engine, "capacitor", partial(_capacitor, frequency_hz=float(solution.Frequency))
         ),
         reactors=_each(engine, "reactor", partial(_reactor, engine)),
-        plants=_each_of(engine, _PLANTS, _plant),
+        plants=_each_of(engine, _PLANTS, partial(_plant, gen_mult=float(solution.GenMult))),
         guards=_each_of(engine, _GUARDS, _guard),
         tap_controls=_each(engine, "regcontrol", _tap_control),
         cap_controls=_each(engine, "capcontrol", _name),
@@ -93,6 +95,14 @@ def read_circuit(engine: Engine, coordinates: dict[str, tuple[float, float]]) ->
     circuit = replace(circuit, opened=_opened_elements(engine, circuit))
     counted = sum(count_of(engine, kind) - len(parts) for kind, parts in enabled.items())
     return replace(circuit, disabled=counted)
+
+
+def _let_switches_act(engine: Engine) -> None:
+    """Open what switch controls are to open: the engine itself does so when it first solves."""
+    for row in rows_of(engine, "swtcontrol"):
+        guard = _guard("swtcontrol", row)
+        if guard.element and str(row["state"]).lower() == "open" and not row["lock"]:
+            tell(engine, [f'Open "{guard.element}" {guard.terminal} 0'])
 
 
 def _opened_elements(engine: Engine, circuit: RawCircuit) -> tuple[tuple[str, bool], ...]:
@@ -180,6 +190,8 @@ def _source(row: Props) -> RawSource:
     return RawSource(
         name=_name(row),
         end=end_of(row["bus1"], phases, phases),
+        earthed=not row["bus2"] or not any(end_of(row["bus2"], phases, phases).nodes),
+        sequence=str(row["sequence"]).lower(),
         phases=phases,
         kv_ll=float(row["basekv"]),
         pu=float(row["pu"]),
@@ -203,21 +215,51 @@ def _line(engine: Engine, code_units: dict[str, Any], row: Props) -> RawLine:
         # a length without a unit is in that of its code
         unit = str(code_units.get(str(code).lower())).lower()
     build = code or row.get("geometry") or row.get("spacing")
-    x = np.array(row["xmatrix"], np.float64)
-    base = float(row["basefreq"])
-    frequency = float(engine.circuit.Solution.Frequency)
+    r_ohm, x_ohm = _matrix(row["rmatrix"]), _matrix(row["xmatrix"])
+    opened = _opened(engine, f"line.{_name(row)}", phases)
+    times = float(engine.circuit.Solution.Frequency) / float(row["basefreq"])
+    if times != 1.0 and not any(map(any, opened)):
+        r_ohm, x_ohm = _at_frequency(engine, row)
+    elif times != 1.0:
+        x_ohm = _matrix((np.array(x_ohm) * times).tolist())
     return RawLine(
         name=_name(row),
         ends=(end_of(row["bus1"], phases, phases), end_of(row["bus2"], phases, phases)),
-        r_ohm=_matrix(row["rmatrix"]),
-        x_ohm=_matrix((x * (frequency / base)).tolist() if base > 0 else row["xmatrix"]),
+        r_ohm=r_ohm,
+        x_ohm=x_ohm,
         c_nf=_matrix(row["cmatrix"]),
         length=float(row["length"]),
         unit_m=_METRES.get(unit),
         build=str(build).lower() if build else None,
         is_switch=bool(row["switch"]),
-        opened=_opened(engine, f"line.{_name(row)}", phases),
+        opened=opened,
     )
+
+
+def _at_frequency(engine: Engine, row: Props) -> tuple[Matrix, Matrix]:
+    """Return R and X, per unit of length, of a line whose matrices are of another frequency.
+
+    The earth's part of the impedance is not proportional to it, so they come from the line's
+    own admittance matrix, in which no conductor may be open.
+    """
+    size = int(row["phases"])
+    y = _own_admittances(engine, f"line.{_name(row)}")
+    own = np.linalg.inv(-y[:size, size:]) / float(row["length"])
+    z = np.asarray((own + own.T) / 2.0)
+    return _matrix(z.real), _matrix(z.imag)
+
+
+def _own_admittances(engine: Engine, element: str) -> NDArray[np.complex128]:
+    """Return the admittance matrix of an element by itself."""
+    engine.circuit.SetActiveElement(element)
+    flat = np.asarray(engine.circuit.ActiveCktElement.Yprim, np.float64)
+    if flat.size < 8:
+        engine.circuit.Solution.BuildYMatrix(0, 1)
+        engine.circuit.SetActiveElement(element)
+        flat = np.asarray(engine.circuit.ActiveCktElement.Yprim, np.float64)
+    y = flat[0::2] + 1j * flat[1::2]
+    size = math.isqrt(y.size)
+    return y.reshape(size, size)
 
 
 def _opened(engine: Engine, element: str, phases: int) -> tuple[tuple[bool, ...], tuple[bool, ...]]:
@@ -290,9 +332,10 @@ def _capacitor(row: Props, frequency_hz: float) -> RawCapacitor:
     branch_kv = kv / 3.0**0.5 if phases > 1 and not delta else kv
     # microfarads are what counts: the engine makes them of kvar in its own way
     kvar_of_uf = 2.0e-3 * math.pi * frequency_hz * branch_kv**2 * phases
+    conductors = phases + 1 if delta and phases < 3 else phases
     return RawCapacitor(
         name=_name(row),
-        end=end_of(row["bus1"], phases, phases),
+        end=end_of(row["bus1"], conductors, phases),
         far=end_of(row["bus2"] or "", phases, phases),
         phases=phases,
         delta=delta,
@@ -305,17 +348,9 @@ def _capacitor(row: Props, frequency_hz: float) -> RawCapacitor:
 
 def _reactor(engine: Engine, row: Props) -> RawReactor:
     """Read a reactor, its impedance out of its own admittance matrix: that covers every way."""
-    engine.circuit.SetActiveElement(f"reactor.{_name(row)}")
-    flat = np.asarray(engine.circuit.ActiveCktElement.Yprim, np.float64)
-    if flat.size < 8:
-        engine.circuit.Solution.BuildYMatrix(0, 1)
-        engine.circuit.SetActiveElement(f"reactor.{_name(row)}")
-        flat = np.asarray(engine.circuit.ActiveCktElement.Yprim, np.float64)
-    y = flat[0::2] + 1j * flat[1::2]
-    size = math.isqrt(y.size)
     phases = int(row["phases"])
     delta = str(row["conn"]).lower().startswith(("d", "l"))
-    own = y.reshape(size, size)[:phases, :phases]
+    own = _own_admittances(engine, f"reactor.{_name(row)}")[:phases, :phases]
     # a delta's matrix has no inverse; its branches are the same in all of them
     z = np.diag(np.full(phases, -1.0 / own[0, 1])) if delta and phases > 1 else np.linalg.inv(own)
     return RawReactor(
@@ -330,11 +365,13 @@ def _reactor(engine: Engine, row: Props) -> RawReactor:
     )
 
 
-def _plant(kind: str, row: Props) -> RawPlant:
+def _plant(kind: str, row: Props, *, gen_mult: float) -> RawPlant:
     kw, kvar = float(row["kw"]) if "kw" in row else 0.0, float(row["kvar"])
     if kind == "pvsystem":
         made = float(row["pmpp"]) * float(row["irradiance"]) * float(row["%pmpp"]) / 100.0
         kw = min(made, float(row["kva"]))
+    if kind == "generator" and str(row["status"]).lower() != "fixed":
+        kw, kvar = kw * gen_mult, kvar * gen_mult
     phases = int(row["phases"])
     return RawPlant(
         kind=kind,

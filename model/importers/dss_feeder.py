@@ -216,27 +216,30 @@ def _source(build: _Build, source_name: str) -> Source:
     Raises
     ------
     InputError
-        If the circuit's own source is none of three phases.
+        If the circuit's own source is none of three phases, earthed and in positive sequence.
     """
     if not build.circuit.sources:
         raise InputError.single(source_name, "vsource", None, "must be there: nothing feeds this")
     first, *others = build.circuit.sources
     for other in others:
         build.findings.add("vsource", other.name, "refused", "a second source")
-    if first.phases != 3 or first.end.nodes != (1, 2, 3):
-        found = f"{first.phases} on nodes {first.end.nodes}"
-        rule = "must have three phases on nodes 1, 2, 3"
-        raise InputError(
-            [
-                Fault(
-                    source=source_name,
-                    line=None,
-                    where=f"vsource {first.name!r}",
-                    wanted=rule,
-                    found=found,
-                )
-            ]
-        )
+    told = [
+        (
+            "must have three phases on nodes 1, 2, 3",
+            f"{first.phases} on nodes {first.end.nodes}",
+            first.phases == 3 and first.end.nodes == (1, 2, 3),
+        ),
+        ("bus2 must be earth, node 0: give its impedance as z0", "another", first.earthed),
+        ("sequence must be pos", first.sequence, first.sequence.startswith("p")),
+    ]
+    where = f"vsource {first.name!r}"
+    faults = [
+        Fault(source=source_name, line=None, where=where, wanted=wanted, found=found)
+        for wanted, found, right in told
+        if not right
+    ]
+    if faults:
+        raise InputError(faults)
     build.findings.add("vsource", first.name, "as it is")
     return Source(
         bus=build.buses.of(first.end.bus),

@@ -171,9 +171,7 @@ def capacitor_of(
     kvar = sum(step for step, state in zip(raw.kvar, raw.states, strict=False) if state)
     kv, nodes, far = raw.kv, raw.end.nodes, raw.far
     if raw.delta:
-        ring = range(raw.phases)
-        far_nodes = [nodes[(n + 1) % raw.phases] if raw.phases > 1 else far.nodes[0] for n in ring]
-        pairs = list(zip(nodes, far_nodes, strict=True))
+        pairs = [(nodes[n], nodes[(n + 1) % len(nodes)]) for n in range(raw.phases)]
     else:
         kv = kv / 3.0**0.5 if raw.phases > 1 else kv
         pairs = list(zip(nodes, far.nodes, strict=True))
@@ -216,7 +214,10 @@ def der_of(
     raw: RawPlant, live: Collection[Node], buses: Names, names: Names, findings: Findings
 ) -> list[Der]:
     """Return the distributed generation that a three-phase plant is."""
-    if raw.kw <= 0.0:
+    if raw.kw < 0.0:
+        findings.add(raw.kind, raw.name, "refused", "it charges: give a load instead")
+        return []
+    if raw.kw == 0.0:
         findings.add(raw.kind, raw.name, "state kept", "delivers nothing: left out")
         return []
     if not any((raw.end.bus, node) in live for node in raw.end.nodes):
@@ -224,6 +225,9 @@ def der_of(
         return []
     if raw.phases != 3 or not all((raw.end.bus, node) in live for node in (1, 2, 3)):
         findings.add(raw.kind, raw.name, "refused", f"{raw.phases}-phase generation")
+        return []
+    if raw.kind == "generator" and raw.model == 3:
+        findings.add(raw.kind, raw.name, "refused", "it holds its voltage (model 3)")
         return []
     factor = raw.kw / (raw.kw**2 + raw.kvar**2) ** 0.5
     findings.add(raw.kind, raw.name, "approximated", "constant power of the positive sequence")

@@ -41,6 +41,8 @@ class RawSource:
 
     name: str
     end: End
+    earthed: bool  #: its other side
+    sequence: str  #: ``pos``: a, b, c
     phases: int
     kv_ll: float
     pu: float

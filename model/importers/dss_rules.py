@@ -79,7 +79,7 @@ LIBRARY_COMMANDS = frozenset(["New", "Edit", "More", "M", "~"])
 
 OPTIONS_KEPT = frozenset(
     word_list(
-        """Frequency Tolerance MaxIterations Loadmodel Loadmult Normvminpu Normvmaxpu Emergvminpu
+        """Frequency Tolerance MaxIterations Loadmult Normvminpu Normvmaxpu Emergvminpu
     Emergvmaxpu Genmult Voltagebases Algorithm Controlmode Allocationfactors Basefrequency
     Maxcontroliter Cfactors DefaultBaseFrequency EarthModel MinIterations
     LongLineCorrection""".lower()

@@ -46,8 +46,9 @@ class Span:
 
 def spans_of(circuit: RawCircuit, live: set[Node], findings: Findings) -> list[Span]:
     """Return every line and series reactor that is fed."""
-    unit_km = _usual_unit(circuit.lines, findings)
-    found = [_span(line, unit_km, live, findings) for line in circuit.lines]
+    coded = _usual_unit([line for line in circuit.lines if line.build], findings)
+    own = _usual_unit([line for line in circuit.lines if not line.build], findings)
+    found = [_span(line, coded if line.build else own, live, findings) for line in circuit.lines]
     found += [
         _reactor_span(reactor, live, findings) for reactor in filter(is_series, circuit.reactors)
     ]
@@ -64,7 +65,7 @@ def _usual_unit(lines: Sequence[RawLine], findings: Findings) -> float:
     """Return the km of a unit of length where the file names none, by usual impedances."""
     ohms = []
     for line in lines:
-        if line.unit_m is None and line.build is not None and not line.is_switch:
+        if line.unit_m is None and not line.is_switch:
             z = np.array(line.r_ohm) + 1j * np.array(line.x_ohm)
             count = len(z)
             mutual = (z.sum() - z.trace()) / (count * (count - 1)) if count > 1 else 0.0
@@ -118,7 +119,7 @@ def _span(line: RawLine, unit_km: float, live: set[Node], findings: Findings) ->
         return None
     findings.add("line", line.name, *_fate(line, kept, fed, neutral))
     length = line.length * line.unit_m / 1000.0 if line.unit_m else line.length * unit_km
-    if not line.unit_m and (line.is_switch or line.build is None):
+    if not line.unit_m and line.is_switch:
         length = _SHORT_KM
     z = _kron((np.array(line.r_ohm) + 1j * np.array(line.x_ohm)) * line.length, neutral)
     pick = np.ix_([kept.index(n) for n in fed], [kept.index(n) for n in fed])

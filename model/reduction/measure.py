@@ -49,6 +49,7 @@ class Measured:
     """Errors of a folded feeder over the load range, and how much faster it is solved."""
 
     scenarios: int
+    levels: tuple[float, float]  #: of all loads of a scenario, least and most
     voltage_pu: Spread  #: |V - V_folded| at every phase of every bus that both have, no break
     z_op: Spread  #: |Z - Z_folded| over |Z|, eq. (5), of breaks inside the sections
     di1: Spread  #: |dI1 - dI1_folded| over |dI1| of the same
@@ -73,7 +74,12 @@ class _Case:
 
 
 def measure(
-    feeder: Feeder, folded: Folded, *, rng: np.random.Generator, scenarios: int = 400
+    feeder: Feeder,
+    folded: Folded,
+    *,
+    rng: np.random.Generator,
+    scenarios: int = 400,
+    levels: tuple[float, float] = LEVEL_RANGE,
 ) -> Measured:
     """Solve both feeders with the same loads, without a break and with one inside a section.
 
@@ -91,7 +97,7 @@ def measure(
         )
     cases = _cases(feeder, folded)
     names = [load.name for load in feeder.loads]
-    level = rng.uniform(*LEVEL_RANGE, scenarios)
+    level = rng.uniform(*levels, scenarios)
     scale = level * rng.uniform(*OWN_RANGE, (len(names), scenarios))
     breaks = _breaks(cases[0], rng, scenarios)
     found = [_solved(case, names, scale, breaks) for case in cases]
@@ -105,6 +111,7 @@ def measure(
     usable = converged & ~np.isnan(z) & ~np.isnan(z_folded) & (np.abs(di1) > LEAST_DI1_A)
     return Measured(
         scenarios=scenarios,
+        levels=levels,
         voltage_pu=_spread(gaps[:, :, converged].ravel()),
         z_op=_spread(np.abs((z_folded - z)[usable]) / np.abs(z[usable])),
         di1=_spread(np.abs((di1_folded - di1)[usable]) / np.abs(di1[usable])),

@@ -8,7 +8,7 @@ from typing import Any
 from .choose import ENDS
 from .equivalent import Kind
 from .fold import Folded
-from .measure import LEVEL_RANGE, OWN_RANGE, Measured, Spread
+from .measure import OWN_RANGE, Measured, Spread
 
 __all__ = ["folded_json", "folded_text"]
 
@@ -43,11 +43,11 @@ def folded_text(folded: Folded, measured: Measured | None = None) -> list[str]:
 
 
 def _measured_text(measured: Measured) -> list[str]:
-    low, high = LEVEL_RANGE
+    low, high = measured.levels
     least, most = OWN_RANGE
     v = measured.voltage_pu
     return [
-        f"  measured in {measured.scenarios} scenarios, loads at {low:g}..{high:g} times"
+        f"  measured in {measured.scenarios} scenarios, loads at {low:.3g}..{high:.3g} times"
         f" {least:g}..{most:g} each (median, 95 %, worst):",
         f"    voltage  {v.median:.1e}, {v.most:.1e}, {v.worst:.1e} pu",
         f"    |Z_op|   {_three(measured.z_op)} of {measured.z_op.count} breaks",
@@ -88,6 +88,7 @@ def folded_json(folded: Folded, measured: Measured | None = None) -> dict[str, A
     if measured is not None:
         found["measured"] = {
             "scenarios": measured.scenarios,
+            "levels": list(measured.levels),
             "voltage_pu": _spread_json(measured.voltage_pu),
             "z_op": _spread_json(measured.z_op),
             "di1": _spread_json(measured.di1),

@@ -29,9 +29,7 @@ def set_admittances(tree: Tree, state: State, work: Work, s: int, floor_pu: floa
     shunts = tree.shunt_s
     for k in range(y.shape[0]):
         store(y, k, load(shunts, k))
-    if tree.machine_unit.size > 0:
-        for k in range(y.shape[0]):
-            store_vector(y_j, k, (0j, 0j, 0j))
+        store_vector(y_j, k, (0j, 0j, 0j))
     for unit in range(unit_node.size):
         node, connection = unit_node[unit], connections[unit, s]
         if not plain[unit] or connection > YG_D:
@@ -59,10 +57,12 @@ def add_branches(tree: Tree, state: State, work: Work, s: int, floor_pu: float) 
         tree.branch_to,
         tree.branch_load,
     )
+    eliminated = work.branch_y
     y, winding_v_pu, at = work.y, work.winding_v_pu, 4 * (tree.unit_node.size + 1)
     for p in range(node.size):
         k, i, j = node[p], first[p], other[p]
         own = load_admittance(tree, state, of_load[p], s, winding_v_pu[at + p], floor_pu)
+        eliminated[p] = own
         y[k, i, i] += own
         if j >= 0:
             y[k, j, j] += own

@@ -97,7 +97,8 @@ def with_peaks(feeder: Feeder, path: Path) -> tuple[Feeder, tuple[MeasuredLoad, 
         measured.append(MeasuredLoad(point=name, level=level))
         before = sum(feeder.loads[k].kw for k in regions.loads[n])
         notes.append(
-            f"{name}: {len(regions.loads[n])} loads scaled by {peak:.4g} "
+            f"{name}{_at_kv(feeder, name, readings.unit)}: "
+            f"{len(regions.loads[n])} loads scaled by {peak:.4g} "
             f"from {before:.4g} to {before * peak:.4g} kW; {said}"
         )
         if regions.ders[n]:
@@ -118,6 +119,14 @@ def with_peaks(feeder: Feeder, path: Path) -> tuple[Feeder, tuple[MeasuredLoad, 
         notes=tuple(notes),
     )
     return replace(feeder, loads=scaled), tuple(measured), match
+
+
+def _at_kv(feeder: Feeder, name: str, unit: Unit) -> str:
+    """The nominal voltage at which amperes are taken; above a substation's transformer it tells."""
+    if unit != "a":
+        return ""
+    bus = next((point.bus for point in feeder.points if point.name == name), feeder.source.bus)
+    return f" (A at {bus_volts(feeder)[bus] * 3.0**0.5 / 1000.0:.4g} kV)"
 
 
 def _solved(

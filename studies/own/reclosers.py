@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import cast, get_args
 
 from ...model.parts import Feeder, Line, Point, Regulator, Switch, VoltageSide
+from ...model.points import fed_by_its_points
 from ...model.reading.fields import did_you_mean
 from ...model.zones import adjacent_sections, outwards
 from .match import Match, by_name
@@ -66,7 +67,9 @@ def with_points(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
         else:
             points.append(found)
     sections, left_out = adjacent_sections(feeder, points)
-    notes = [f"{len(sections)} sections between neighbouring points", *left_out]
+    placed = replace(feeder, points=tuple(points), sections=sections)
+    sections, not_fed = fed_by_its_points(placed)
+    notes = [f"{len(sections)} sections between neighbouring points", *left_out, *not_fed]
     paired = {name for section in sections for name in (section.local, section.remote)}
     alone = [point.name for point in points if point.name not in paired]
     if alone:
@@ -84,7 +87,7 @@ def with_points(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
         without_row=(),
         notes=tuple(notes),
     )
-    return replace(feeder, points=tuple(points), sections=sections), match
+    return replace(placed, sections=sections), match
 
 
 def _read(table: OwnTable) -> list[Point]:

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from ...model.distributions import Choices
 from ...model.events.base import Places, places_on
+from ...model.leaps import with_leaps
 from ...model.network import CONNECTIONS, Network, compile_network
+from ...model.neutrals import wires_at_unknown
 from ...model.parts import Feeder
-from ...model.points import Points, find_points
+from ...model.points import Points, find_points, point_probes
 from ...model.sides import edge_nodes
 from ...optimise.counts import Grid
 from ..spec.events import CLASSES, SwitchState
@@ -21,6 +23,7 @@ from ..spec.parts import Group as GroupSpec
 from ..spec.study_file import Study
 from .classes import DrawClass
 from .load_levels import load_places
+from .starting import Start, fit_start
 
 __all__ = ["Case", "Group", "Sites", "Wired", "make_case", "make_cases"]
 
@@ -42,6 +45,7 @@ class Wired:
 
     network: Network
     points: Points
+    start: Start
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,6 +70,7 @@ class Case:
     group: Group
     network: Network
     points: Points
+    start: Start
     ties: tuple[Wired, ...]  #: states that tie switching goes to and comes from
     transfers: tuple[Wired, ...]  #: and transfers
     places: Mapping[int, Sites]  #: on lines of at least so many phases
@@ -81,7 +86,7 @@ class Case:
     @property
     def wired(self) -> Wired:
         """The state itself."""
-        return Wired(network=self.network, points=self.points)
+        return Wired(network=self.network, points=self.points, start=self.start)
 
 
 def make_cases(feeder: Feeder, study: Study) -> tuple[Case, ...]:
@@ -96,8 +101,7 @@ def make_cases(feeder: Feeder, study: Study) -> tuple[Case, ...]:
         For a state that cannot be solved: several loops, or a part that nothing feeds.
     """
     groups = study.setting_groups()
-    motors = study.motors.share is not None
-    wired = [_wire(feeder, group, motors) for group in groups]
+    wired = [_wire(feeder, study, group) for group in groups]
     looks = np.array([[not t.load_side for t in state.points.terminals] for state in wired])
     if study.network.settings == "one":
         looks = np.tile(looks.any(axis=0), (len(groups), 1))
@@ -112,11 +116,14 @@ def make_case(feeder: Feeder, study: Study) -> Case:
     return make_cases(feeder, study)[0]
 
 
-def _wire(feeder: Feeder, state: GroupSpec | SwitchState, motors: bool) -> Wired:
+def _wire(feeder: Feeder, study: Study, state: GroupSpec | SwitchState) -> Wired:
     closed = None if state.closed is None else frozenset(state.closed)
     opened = frozenset(state.opened)
+    motors = study.motors.share is not None
     network = compile_network(feeder, closed, opened, motors=motors)
-    return Wired(network=network, points=find_points(feeder, network, opened))
+    points = find_points(feeder, network, opened)
+    start = fit_start(network, study)
+    return Wired(network=with_leaps(network, point_probes(points)), points=points, start=start)
 
 
 def _case(
@@ -126,13 +133,14 @@ def _case(
     ties = _others(feeder, study, study.events.tie_switching.states, wired)
     transfers = _others(feeder, study, study.events.transfer.states, wired)
     unknown = [n for n, unit in enumerate(feeder.transformers) if unit.connection == "unknown"]
-    choices = study.transformers.unknown or UNKNOWN_CONNECTION[feeder.source.wires]
+    choices = study.transformers.unknown or UNKNOWN_CONNECTION[wires_at_unknown(feeder)]
     return Case(
         feeder=feeder,
         study=study,
         group=group,
         network=network,
         points=wired.points,
+        start=wired.start,
         ties=ties,
         transfers=transfers,
         places={least: _sites(network, wired.points, least) for least in (1, 2, 3)},
@@ -164,7 +172,7 @@ def _others(
     def key(state: Wired) -> set[object]:
         return {piece.key for piece in state.network.pieces if piece is not None}
 
-    wired = [_wire(feeder, state, study.motors.share is not None) for state in states]
+    wired = [_wire(feeder, study, state) for state in states]
     return tuple(state for state in wired if key(state) != key(own))
 
 

@@ -13,14 +13,14 @@ from ...detector.instruments import Bounds, measure, miswire
 from ...detector.supervision import fed_one_way, wiring_alarm
 from ...model.after import solve_after
 from ...model.events.base import Event
-from ...model.network import Network
 from ...model.points import into_line, point_probes
 from ...model.sides import Side
-from ...model.solve import solve, steady_state
-from ...model.states import Answer, State
+from ...model.solve import solve
+from ...model.states import Answer
 from .cases import Case, Wired
 from .draw import Scenarios
 from .draw_event import event_sides
+from .starting import start_of
 
 __all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "bounds_of", "observe"]
 
@@ -65,7 +65,7 @@ def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
         first.network,
         scenarios.before,
         point_probes(first.points),
-        start=_guess(first.network, scenarios.before),
+        start=start_of(first.start, first.network, scenarios.before),
         tolerance_pu=TOLERANCE_PU,
     )
     after = solve_after(
@@ -123,10 +123,3 @@ def _fallen_ohm(event: Event) -> NDArray[np.float64]:
 def _into(wired: Wired, answer: Answer) -> NDArray[np.complex128]:
     """(P, 3, S) currents, positive into each point's line."""
     return answer.i * into_line(wired.points)[:, None, None]
-
-
-def _guess(network: Network, state: State) -> NDArray[np.float64]:
-    """Winding voltages near the solution: the drop at nominal load, scaled by the mean load."""
-    drop = 1.0 - solve(network, steady_state(network)).winding_v_pu
-    mean = state.load_scale.sum(axis=0) / max(len(network.loads), 1)
-    return np.asarray(1.0 - drop * mean)

@@ -27,8 +27,8 @@ STATED = (
 )
 
 
-def assumptions(result: dict[str, Any], study: Study) -> str:
-    """The report's section on them."""
+def assumptions(result: dict[str, Any], study: Study, made_from: str | None = None) -> str:
+    """The report's section on them; ``made_from`` says what the feeder was imported from."""
     numerics = result["numerics"]
     solved = (
         "Numerics: what an opened conductor leads to is dead (nothing connected, or no source) in "
@@ -36,11 +36,12 @@ def assumptions(result: dict[str, Any], study: Study) -> str:
         f"nothing earths a part behind an ungrounded winding in {numerics['unearthed']:,}; "
         f"{numerics['not_converged']:,} did not converge{_unsettled(numerics)}."
     )
+    source = [] if made_from is None else [f"The feeder is imported from {made_from}."]
     drawn = {own["name"] for row in result["sections"] for own in row["classes"]}
     missing = bullets(result["feeder_false_trips"]["assumptions"])
     return (
         "<h2>Assumptions</h2>\n<p>The bounds hold for events drawn as follows, and for no "
-        f"others.</p>\n{bullets([*STATED, solved])}\n<h3>The study</h3>\n"
+        f"others.</p>\n{bullets([*source, *STATED, solved])}\n<h3>The study</h3>\n"
         "<p>Every value of study.toml: [a, b] is uniform between a and b; docs/study-file.md says "
         f"what each means.</p>\n{_laws(study, drawn)}\n<h3>Not covered</h3>\n{missing}"
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...model.buses import bus_volts
-from ...model.parts import Feeder, Line
+from ...model.parts import Feeder, Line, Switch
 from ...model.zones import Edge, outwards
 
 __all__ = ["LOW_V", "Places", "Spot", "has_coordinates", "place_buses"]
@@ -78,9 +78,8 @@ def place_buses(feeder: Feeder) -> Places:
     at = _as_tree(tree, near)
     lowest = min(y for _, y in at.values())
     # what only open switches reach stands below
-    loose = dict.fromkeys(
-        bus for part in (*feeder.lines, *feeder.switches) for bus in (part.from_bus, part.to_bus)
-    )
+    conductors: list[Line | Switch] = [*feeder.lines, *feeder.switches]
+    loose = dict.fromkeys(bus for part in conductors for bus in (part.from_bus, part.to_bus))
     for bus in loose:
         if bus not in at:
             lowest -= 1.0
@@ -120,7 +119,7 @@ def _as_tree(
     km = _kilometres(tree, JOINT * reach)
     farthest = dict(km)
     children: defaultdict[str, list[str]] = defaultdict(list)
-    for bus in reversed(tree):
+    for bus in reversed(list(tree)):
         if bus in near:
             farthest[near[bus]] = max(farthest[near[bus]], farthest[bus])
             children[near[bus]].append(bus)

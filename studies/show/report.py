@@ -10,7 +10,7 @@ from ...optimise.staircase import Front
 from ..run.cases import Case
 from ..run.certify import Validation
 from ..run.store import RunFolder
-from ..spec.study_file import Study
+from ..spec.study_file import Study, resolved
 from .assumptions import assumptions
 from .by_class import at_a_glance, by_class, several_groups
 from .html_parts import (
@@ -130,10 +130,15 @@ def write_report(
                 pictures[profile] = png_of(plot_profile, along)
     for name, png in pictures.items():
         folder.write(name, png)
-    folder.write("report.html", report_html(result, cases[0].study, pictures))
+    feeder = cases[0].feeder
+    study = resolved(cases[0].study, feeder)
+    page = report_html(result, study, pictures, feeder.imported_from)
+    folder.write("report.html", page)
 
 
-def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]) -> str:
+def report_html(
+    result: dict[str, Any], study: Study, pictures: dict[str, bytes], made_from: str | None = None
+) -> str:
     """The page; ``pictures`` are embedded by their names."""
     what = "Assessment of open-phase settings" if "assessed" in result else "Open-phase settings"
     title = f"{what} for feeder {result['feeder']}"
@@ -151,7 +156,7 @@ def report_html(result: dict[str, Any], study: Study, pictures: dict[str, bytes]
             for n, row in enumerate(result["sections"])
             if row["classes"]
         ),
-        assumptions(result, study),
+        assumptions(result, study, made_from),
         f"<footer><p>openphase {escape(result['version'])}; inputs, versions and hashes are in "
         "manifest.json, every default in study.toml, all numbers in result.json.</p></footer>",
     ]

@@ -38,7 +38,7 @@ UNKNOWN_CONNECTION = {
     4: Choices(values=("Yg/Yg", "D/Yg", "Yg/D"), weights=(0.6, 0.3, 0.1)),
     3: Choices(values=("D/Yg", "D/D", "Y/D"), weights=(0.8, 0.1, 0.1)),
 }
-"""What a transformer of unknown connection may be, by the feeder's wires: a guess."""
+"""What a transformer of unknown connection may be, by the wires at their places: a guess."""
 
 
 # ---- the state of the feeder before the event ----

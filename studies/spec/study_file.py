@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from ... import model
 from ...model.errors import Locator, Report
+from ...model.neutrals import wires_at_unknown
 from ...model.parts import Feeder
 from ...model.reading.feeder_file import shipped_feeders
 from ...model.reading.toml_file import parse_toml, read_text, toml_rows
@@ -214,7 +215,7 @@ def resolved(study: Study, feeder: Feeder) -> Study:
     if not study.groups:
         closed = tuple(sorted(normal if closed is None else closed))
     if any(unit.connection == "unknown" for unit in feeder.transformers):
-        unknown = unknown or UNKNOWN_CONNECTION[feeder.source.wires]
+        unknown = unknown or UNKNOWN_CONNECTION[wires_at_unknown(feeder)]
     events = study.events
     return replace(
         study,

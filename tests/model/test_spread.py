@@ -9,7 +9,9 @@ from oracles.trees import SOURCE, line, plain_load, random_tree
 
 from openphase.model import load_feeder
 from openphase.model.line_matrices import z1_ohm
+from openphase.model.network import compile_network
 from openphase.model.parts import Feeder, InlineTransformer, Place, Regulator, Switch
+from openphase.model.points import find_points
 from openphase.model.spread import spread_points
 from openphase.model.trunk import find_trunk
 
@@ -63,6 +65,15 @@ def test_places_are_even_to_within_a_line(count):
     assert names == [f"M{n}" for n in range(1, count + 1)]
     assert [(s.local, s.remote) for s in spread.feeder.sections] == list(pairwise(names))
     assert spread.inside == ()
+
+
+def test_every_section_beside_a_second_way_is_one_that_points_can_have():
+    radial = chain([1.0] * 4)
+    beside = line("beside", "B3", "B4", km=1.0, phases="abc")
+    spread = spread_points(replace(radial, lines=(*radial.lines, beside)))
+    terminals = find_points(spread.feeder, compile_network(spread.feeder)).terminals
+    assert len(terminals) == 2 * len(spread.feeder.sections) > 0
+    assert any("neither of them" in text for text in spread.said)
 
 
 def test_a_regulator_lies_between_two_points_and_in_no_section():

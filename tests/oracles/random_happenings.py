@@ -41,7 +41,7 @@ def random_happening(rng: np.random.Generator, feeder: Feeder, network: Network)
     """
     event, what = no_event(network, 1), set()
     volts = nominal_volts(feeder)
-    if rng.random() < 0.9:
+    if rng.random() < 0.9 and np.any(network.length_km > 0):
         event = replace(event, edge=np.array([_edge(rng, network)]), share=np.array([_share(rng)]))
         edge = network.pieces[int(event.edge[0])]
         assert edge is not None

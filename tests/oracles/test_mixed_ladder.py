@@ -19,7 +19,7 @@ from openphase.model.network import compile_network
 from openphase.model.parts import Feeder
 from openphase.model.solve import solve, steady_state
 
-FEEDERS = 300
+FEEDERS = 250
 NONE: frozenset[str] = frozenset()
 
 Sample = dict[int, tuple[Case, list[Outcome]]]

@@ -21,6 +21,7 @@ from openphase.model.parts import (
     Place,
     Regulator,
     Source,
+    Switch,
 )
 from openphase.model.solve import solve, steady_state
 from openphase.model.states import Answer
@@ -283,6 +284,21 @@ def test_two_in_parallel_are_one_of_twice_the_rating() -> None:
     twin = [InlineTransformer(name=f"X{n}", connection="D/Yg", **UNIT) for n in range(2)]
     one = InlineTransformer(name="X", connection="D/Yg", **(UNIT | {"rating_kva": 6000.0}))
     same(between(*twin), between(one))
+
+
+@pytest.mark.parametrize("reference", ["S", "E"])
+def test_a_loop_that_a_switch_closes_is_one_without_the_switch(reference: str) -> None:
+    """At the bus where it forks, and at one further down."""
+    feeder = a_feeder()
+    back = a_line("EX", "E", "B", 3.0)
+    tie = Switch(name="TIE", from_bus="B", to_bus="S", closed=True)
+    if reference == "E":
+        back = a_line("SX", "S", "B", 3.0)
+        tie = replace(tie, to_bus="E")
+    joined = replace(back, to_bus=reference)
+    one = solved(replace(feeder, lines=(*feeder.lines, back), switches=(tie,)))
+    same(one, solved(replace(feeder, lines=(*feeder.lines, joined))))
+    np.testing.assert_allclose(one.v("B"), one.v(reference), atol=1e-9 * V)
 
 
 # Symmetries ---------------------------------------------------------------------------------------

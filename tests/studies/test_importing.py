@@ -78,6 +78,8 @@ def test_a_reduced_feeder_says_its_error(circuit: Path, capsys: pytest.CaptureFi
     assert run("import", circuit, "-o", out, "--reduce", "--json") == 0
     assert "reduction" in json.loads(capsys.readouterr().out)
     assert read_feeder(out).loads
+    assert run("check", out) == 0
+    assert "(from town.dss, laterals and low voltage folded)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("words", [(), ("-o", "town.dss"), ("--report", "town.txt")])
@@ -117,3 +119,13 @@ def test_what_cannot_be_imported_ends_with_code_2(
     assert "--drop isource.x" in capsys.readouterr().err
     assert not out.exists()
     assert run("import", circuit, "-o", out, "--drop", "isource.x") == 0
+
+
+def test_folding_is_measured_down_to_the_least_load_that_was_measured(
+    circuit: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    peaks, out = circuit.parent / "peaks.csv", circuit.parent / "town.toml"
+    peaks.write_text("point,max_kw,min_kw\ns,300,30\n", encoding="utf-8")
+    assert run("import", circuit, "-o", out, "--peaks", peaks, "--reduce", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["reduction"]["measured"]["levels"] == pytest.approx([0.1, 1.0], rel=0.05)

@@ -185,7 +185,7 @@ def test_what_lies_full_in_the_settings_corner_is_what_trips_there(finished):
             triggered = cloud.di1_a >= row["i_set_a"]
             assert np.array_equal(here & cloud.able, triggered & cloud.trips)
             corner += int((here & cloud.able).sum())
-    assert corner > 10
+    assert corner > 3
 
 
 def test_rings_mark_what_the_phases_find_and_what_trips_falsely(finished):

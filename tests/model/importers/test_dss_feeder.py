@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -63,6 +64,41 @@ def test_every_kind_of_element_agrees_with_the_engine(name: str, tmp_path: Path)
     told = {row.element for row in found.findings.rows}
     given = [text.split()[1].lower() for text in EVERY[name] if text.startswith("new ")]
     assert {element for element in given if not element.startswith("linecode.")} <= told
+
+
+@needs_engine
+def test_lines_of_a_file_that_never_solves_have_their_own_matrices(tmp_path: Path) -> None:
+    path = tmp_path / "bare.dss"
+    own = "new line.own bus1=s bus2=a length=5 units=km r1=0.3 x1=0.4 r0=0.5 x0=1.2"
+    wires = "new wiredata.w rac=0.3 gmrac=0.02 gmrunits=ft diam=0.7 radunits=in runits=mi"
+    conductors = (f"~ cond={n} wire=w x={n} h=9 units=m" for n in (1, 2, 3))
+    geometry = "\n".join(("new linegeometry.g nconds=3 nphases=3", *conductors))
+    drawn = "new line.drawn bus1=a bus2=b geometry=g length=2 units=km"
+    load = "new load.l bus1=b kv=12.47 kw=800"
+    path.write_text("\n".join((*HEAD, own, wires, geometry, drawn, load)), encoding="utf-8")
+    found = import_opendss(path)
+    agree(found, 1e-6)
+    # r1 behind units takes the unit away, so the length gets the usual one
+    assert {line.name: line.length_km for line in found.feeder.lines} == {"own": 5.0, "drawn": 2.0}
+
+
+@needs_engine
+@pytest.mark.parametrize("told", ["action=open", "state=open", "normal=open"])
+def test_what_a_switch_control_holds_open_is_open(told: str, tmp_path: Path) -> None:
+    tie = "new line.tie bus1=m bus2=b switch=y"
+    control = f"new swtcontrol.held switchedobj=line.tie switchedterm=1 {told}"
+    found = imported(tmp_path, tie, "new line.way bus1=m bus2=b length=1", control)
+    assert [switch.closed for switch in found.feeder.switches if switch.name == "tie"] == [False]
+    agree(found, 1e-6)
+
+
+@needs_engine
+def test_what_to_drop_can_be_pasted_into_a_shell(tmp_path: Path) -> None:
+    names = ("my cap", "it's", "a[1]", "a$(b)", "a;b")
+    with pytest.raises(InputError) as caught:
+        imported(tmp_path, *(f'new "capacitor.{n}" bus1=m bus2=b kvar=9 kv=12' for n in names))
+    drops = shlex.split(str(caught.value).partition("; --drop ")[2])
+    assert drops[::2] == [f"capacitor.{name}" for name in names]
 
 
 @needs_engine
@@ -163,6 +199,68 @@ def test_fuses_and_open_lines_come_in_as_switches(tmp_path: Path) -> None:
     assert switches["r1"].from_bus == lines["tie"].to_bus
     assert switches["open"].to_bus == "m"
     assert lines["open"].to_bus == switches["open"].from_bus
+
+
+@pytest.mark.parametrize(
+    ("more", "closed"),
+    [("action=open", False), ("normal=open", False), ("action=open lock=yes", True)],
+)
+@needs_engine
+def test_a_switch_control_opens_what_the_engine_opens(
+    more: str, closed: bool, tmp_path: Path
+) -> None:
+    found = imported(
+        tmp_path,
+        "new line.l1 bus1=m bus2=b linecode=oh length=1 units=mi",
+        "new line.l2 bus1=m bus2=b linecode=oh length=2 units=mi",
+        "new load.l bus1=b phases=3 kv=12.47 kw=900",
+        f"new swtcontrol.sw switchedobj=line.l1 switchedterm=2 {more}",
+    )
+    assert [switch.closed for switch in found.feeder.switches] == [closed]
+    assert max(row.largest_pu for row in differences(found)) < 1e-6
+
+
+@needs_engine
+def test_matrices_of_another_frequency_take_the_earth_with_them(tmp_path: Path) -> None:
+    found = imported(
+        tmp_path,
+        "new linecode.fifty nphases=3 r1=.3 x1=.6 r0=.6 x0=1.8 c1=3 c0=2 units=km basefreq=50",
+        "new line.l1 bus1=m bus2=b linecode=fifty length=9 units=km",
+        "new load.l bus1=b.1 phases=1 kv=7.2 kw=900",
+    )
+    assert max(row.largest_pu for row in differences(found)) < 1e-6
+
+
+@needs_engine
+def test_capacitors_between_two_phases_agree(tmp_path: Path) -> None:
+    found = imported(
+        tmp_path,
+        "new capacitor.one bus1=m.3.1 phases=1 conn=delta kv=12.47 kvar=100",
+        "new capacitor.two bus1=m.2 bus2=m.3 phases=1 kv=12.47 kvar=70",
+        "new capacitor.three bus1=m.1.2.3 phases=2 conn=delta kv=12.47 kvar=90",
+    )
+    agree(found, 1e-6)
+
+
+@needs_engine
+def test_generation_takes_the_multiplier_and_what_charges_is_refused(tmp_path: Path) -> None:
+    plants = [f"new generator.{name} bus1=m kv=12.47 kw=500 pf=0.9" for name in ("v", "f")]
+    found = imported(tmp_path, *plants, "edit generator.f status=fixed", "set genmult=0.4")
+    assert [(der.name, der.kw) for der in found.feeder.ders] == [("v", 200.0), ("f", 500.0)]
+    with pytest.raises(InputError, match="it charges"):
+        imported(tmp_path, "new storage.s bus1=m kv=12.47 kwrated=90 kwhrated=200 state=charging")
+
+
+@pytest.mark.parametrize(
+    ("more", "wanted"),
+    [("bus2=s.4.4.4", "bus2 must be earth"), ("sequence=neg", "sequence must be pos")],
+)
+@needs_engine
+def test_a_source_that_the_model_does_not_have_is_refused(
+    more: str, wanted: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=wanted):
+        imported(tmp_path, f"edit vsource.source {more}")
 
 
 @needs_engine
