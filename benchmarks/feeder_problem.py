@@ -81,11 +81,12 @@ def draw_feeder_problem(name: str, linear: bool, size: int) -> FeederProblem:
 
 def _draw(feeder: Feeder, rng: np.random.Generator, size: int) -> Events:
     masks = list(bus_phases(feeder).values())
+    earthed = _earthed(feeder)
     lines = len(feeder.lines)
     kind = rng.choice(len(KINDS), size, p=list(KINDS.values()))
     opens, steps, faults, sources = (kind == n for n in range(4))
     line = np.where(opens, rng.integers(lines, size=size), -1)
-    bus = np.where(faults, rng.integers(len(masks), size=size), -1)
+    bus = np.where(faults, rng.choice(earthed, size), -1)
     there = ["abc"] * size
     for s in range(size):
         if opens[s]:
@@ -107,6 +108,12 @@ def _draw(feeder: Feeder, rng: np.random.Generator, size: int) -> Events:
         source=np.where(sources, rng.uniform(*SOURCE_FACTORS, size), 1.0),
         factor=(before, after),
     )
+
+
+def _earthed(feeder: Feeder) -> list[int]:
+    """Buses that are not behind a winding in delta: there OpenDSS gets a phase held."""
+    delta = {unit.to_bus for unit in feeder.inline_transformers if unit.connection.endswith("/D")}
+    return [n for n, bus in enumerate(bus_phases(feeder)) if bus not in delta]
 
 
 def _states(

@@ -3,9 +3,9 @@
 Every driving keeps three circuits, so that nothing is ever put back: one that stays intact (all
 states before, load and source steps), one whose conductors open, and one with a fault at every
 node. States after an event come sorted by place, which saves OpenDSS matrices, not the product.
-``SHAPES`` plays the loads and the EMF as daily shapes, so that no element is edited and the
-matrix of an intact circuit is made once; ``DIRECT`` writes every load, two batches a state, and
-solves the matrix once; ``ONE`` is that with a single circuit, opened and closed again.
+The first plays the loads and the EMF as daily shapes, so that no element is edited and the
+matrix of an intact circuit is made once; the second writes every load, two batches a state, and
+solves the matrix once; the third is that with a single circuit, opened and closed again.
 """
 
 from __future__ import annotations
@@ -19,11 +19,8 @@ from feeder_dss import ALMOST_NOTHING_OHM, circuit_of
 from feeder_problem import FeederProblem
 from numpy.typing import NDArray
 
-__all__ = ["DRIVINGS", "Driven", "driven"]
+__all__ = ["DRIVINGS", "Driven"]
 
-TOLERANCE = {True: 1e-8, False: 1e-5}
-"""Largest change of a voltage in OpenDSS's last iteration, loads linear or by their laws: the
-first is what agreement to 1e-6 takes, the second the product's own."""
 MOST_ITERATIONS = 100
 
 Complex = NDArray[np.complex128]
@@ -35,7 +32,7 @@ Driven = Callable[[], Result]
 class Circuit:
     """One context with the feeder in it."""
 
-    def __init__(self, problem: FeederProblem, linear: bool, faults: bool, reuse: int = 0) -> None:
+    def __init__(self, problem: FeederProblem, linear: bool, faults: bool, pu: float) -> None:
         self.engine = DSS.NewContext()
         self.engine.AllowForms = False
         self.engine.AdvancedTypes = False
@@ -48,10 +45,8 @@ class Circuit:
         ]
         self.opened: tuple[int, int] | None = None
         self.fault = ""
-        self.tell([f"set tolerance={TOLERANCE[linear]!r} maxiterations={MOST_ITERATIONS}"])
+        self.tell([f"set tolerance={pu!r} maxiterations={MOST_ITERATIONS}"])
         self.tell(["set controlmode=off", "set mode=snap", "solve"])
-        if reuse:
-            self.engine.YMatrix.SolverOptions = reuse
 
     def tell(self, commands: Sequence[str]) -> None:
         for command in commands:
@@ -104,12 +99,12 @@ class Batch:
             self.set(self.batch, self.count, name, at, self.flags)
 
 
-def _shapes(problem: FeederProblem, linear: bool, reuse: int) -> Driven:
+def _shapes(problem: FeederProblem, linear: bool, pu: float) -> Driven:
     events = problem.events
     size = events.kind.size
     order = _order(problem)
     where = np.choose(events.kind[order], [1, 0, 2, 0, 0])
-    circuits = [Circuit(problem, linear, faults=n == 2, reuse=reuse) for n in range(3)]
+    circuits = [Circuit(problem, linear, faults=n == 2, pu=pu) for n in range(3)]
     kept = [order[where == n] for n in range(3)]
     # the intact circuit plays all the states before, then those after that leave it intact
     factors = [events.factor[1][:, kept[n]] for n in range(3)]
@@ -155,15 +150,15 @@ def _play(own: Circuit, factor: Real, source: Real) -> None:
     own.tell(["set mode=daily stepsize=1h number=1"])
 
 
-def _direct(problem: FeederProblem, linear: bool, reuse: int, contexts: int) -> Driven:
+def _direct(problem: FeederProblem, linear: bool, pu: float, contexts: int) -> Driven:
     events = problem.events
     size = events.kind.size
     order = _order(problem)
     where = np.choose(events.kind[order], [1, 0, 2, 0, 0])
     if contexts == 1:
-        circuits = [Circuit(problem, linear, faults=True, reuse=reuse)] * 3
+        circuits = [Circuit(problem, linear, faults=True, pu=pu)] * 3
     else:
-        circuits = [Circuit(problem, linear, faults=n == 2, reuse=reuse) for n in range(3)]
+        circuits = [Circuit(problem, linear, faults=n == 2, pu=pu) for n in range(3)]
     batches = [Batch(own) for own in circuits]
     kw = np.array([load.kw for load in problem.feeder.loads])
     kvar = np.array([load.kvar for load in problem.feeder.loads], np.float64)
@@ -224,16 +219,26 @@ def _order(problem: FeederProblem) -> NDArray[np.int64]:
     return np.lexsort((own.phase, own.bus, own.line, own.kind))
 
 
-def driven(problem: FeederProblem, linear: bool, driving: str) -> tuple[list[str], Driven]:
-    """Names of OpenDSS's nodes, in its order, and what solves all states."""
-    names = [str(n) for n in Circuit(problem, linear, faults=False).circuit.YNodeOrder]
-    return names, DRIVINGS[driving](problem, linear)
+def _names(problem: FeederProblem, linear: bool, pu: float) -> list[str]:
+    circuit = Circuit(problem, linear, faults=False, pu=pu).circuit
+    return [str(name) for name in circuit.YNodeOrder]
 
 
-DRIVINGS: dict[str, Callable[[FeederProblem, bool], Driven]] = {
-    "three contexts, daily shapes": lambda p, linear: _shapes(p, linear, 0),
-    "three contexts, daily shapes, factors reused": lambda p, linear: _shapes(p, linear, 2),
-    "three contexts, batch writes": lambda p, linear: _direct(p, linear, 0, 3),
-    "three contexts, batch writes, factors reused": lambda p, linear: _direct(p, linear, 2, 3),
-    "one context, batch writes": lambda p, linear: _direct(p, linear, 0, 1),
+def _shaped(problem: FeederProblem, linear: bool, pu: float) -> tuple[list[str], Driven]:
+    return _names(problem, linear, pu), _shapes(problem, linear, pu)
+
+
+def _batched(problem: FeederProblem, linear: bool, pu: float) -> tuple[list[str], Driven]:
+    return _names(problem, linear, pu), _direct(problem, linear, pu, 3)
+
+
+def _alone(problem: FeederProblem, linear: bool, pu: float) -> tuple[list[str], Driven]:
+    return _names(problem, linear, pu), _direct(problem, linear, pu, 1)
+
+
+DRIVINGS: dict[str, Callable[[FeederProblem, bool, float], tuple[list[str], Driven]]] = {
+    "three circuits, daily shapes": _shaped,
+    "three circuits, batch writes": _batched,
+    "one circuit, batch writes": _alone,
 }
+"""Each with loads linear or not and a tolerance; returns node names in order and what solves."""

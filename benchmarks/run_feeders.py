@@ -1,0 +1,155 @@
+"""Mixed events on real feeders: the product and OpenDSS's drivings in turns; prints JSON.
+
+A driving is timed only after its voltages agree with the product's, both solved to a much smaller
+tolerance; nodes beyond a break that nothing feeds, unearthed parts and states that OpenDSS does
+not converge are left out and counted. Times are the process's own, so that a crowded machine
+falls on both alike.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+from collections.abc import Callable
+from time import process_time
+from typing import Any
+
+import numpy as np
+from feeder_dss import unearthed_buses
+from feeder_problem import FeederProblem, draw_feeder_problem
+from numpy.typing import NDArray
+
+from openphase.model.after import solve_after
+from openphase.model.buses import bus_volts
+from openphase.model.solve import solve, steady_state
+from openphase.model.states import NOT_CONVERGED, UNEARTHED, State
+from openphase.studies.run.engine import BLOCK, TOLERANCE_PU
+
+FEEDERS = ("ieee34", "ieee123")
+SCENARIOS = 4000
+OTHERS = 1000  #: for OpenDSS
+REPEATS = 3
+AGREE_PU = {True: 1e-6, False: 1e-4}  #: loads linear, or by their laws
+TIGHT_PU = 1e-8  #: tolerance of both while they are compared
+UNDEFINED = 8
+
+Row = dict[str, Any]
+
+
+def main() -> None:
+    try:
+        from peer_feeders import DRIVINGS
+    except ImportError:
+        json.dump({"why": "not installed: pip install dss-python"}, sys.stdout)
+        return
+    rows = [_row(name, linear, DRIVINGS) for linear in (True, False) for name in FEEDERS]
+    json.dump({"rows": rows}, sys.stdout)
+
+
+def _row(name: str, linear: bool, drivings: dict[str, Any]) -> Row:
+    product = _product(draw_feeder_problem(name, linear, SCENARIOS))
+    problem = draw_feeder_problem(name, linear, OTHERS)
+    product()
+    peers: dict[str, Row] = {}
+    runs: dict[str, Callable[[], Any]] = {}
+    for title, drive in drivings.items():
+        peers[title], run = _checked(problem, linear, drive)
+        if run:
+            runs[title] = run
+    own: list[float] = []
+    spent: dict[str, list[float]] = {title: [] for title in runs}
+    for _ in range(REPEATS):
+        for title, run in runs.items():
+            own.append(_timed(product))
+            spent[title].append(_timed(run))
+    for title in runs:
+        peers[title]["per_s"] = OTHERS / statistics.median(spent[title])
+    row: Row = {"feeder": name, "linear": linear, "nodes": len(problem.network.nodes)}
+    return row | {"per_s": SCENARIOS / statistics.median(own), "peers": peers}
+
+
+def _timed(run: Callable[[], object]) -> float:
+    start = process_time()
+    run()
+    return process_time() - start
+
+
+def _product(problem: FeederProblem) -> Callable[[], None]:
+    """Both states, block by block, started as a study starts them."""
+    network, probes = problem.leaping, problem.probes
+    drop = 1.0 - solve(problem.network, steady_state(problem.network)).winding_v_pu
+    parts = [slice(s, s + BLOCK) for s in range(0, SCENARIOS, BLOCK)]
+    blocks = [(_some(problem.before, part), _some(problem.after, part)) for part in parts]
+
+    def run() -> None:
+        for before, after in blocks:
+            start = 1.0 - drop * before.load_scale.mean(axis=0)
+            known = solve(network, before, probes, start=start, tolerance_pu=TOLERANCE_PU)
+            none = np.zeros((0, before.emf_pu.size))
+            solve_after(network, (before, known), after, (none, None), probes, TOLERANCE_PU)
+
+    return run
+
+
+def _some(state: State, chosen: slice) -> State:
+    return State._make(np.ascontiguousarray(values[..., chosen]) for values in state)
+
+
+def _checked(
+    problem: FeederProblem, linear: bool, drive: Callable[..., Any]
+) -> tuple[Row, Callable[[], Any] | None]:
+    """How far a driving is from the product, and it at its own tolerance if that is near."""
+    names, run = drive(problem, linear, TIGHT_PU)
+    *found, good = run()
+    gap, left_out = 0.0, 0
+    for n, state in enumerate((problem.before, problem.after)):
+        answer = solve(problem.network, state, tolerance_pu=TIGHT_PU)
+        known, there = _expected(problem, names, answer.v, answer.flags, state)
+        there &= (good[n] & (answer.flags & NOT_CONVERGED == 0))[:, None]
+        # what its matrix leaves undefined is not a number
+        off = np.abs(np.where(there, found[n], 0.0) - np.where(there, known, 0.0))
+        gap = max(gap, float((off / _nominal(problem, names)).max()))
+        left_out += int((~there).sum())
+    row: Row = {"gap_pu": gap, "allowed_pu": AGREE_PU[linear]}
+    row |= {"left_out": left_out / (2 * there.size)}
+    timed = drive(problem, linear, TIGHT_PU if linear else TOLERANCE_PU)[1]
+    *_, good = timed()
+    row["not_converged"] = int((~good).sum())
+    if gap > AGREE_PU[linear]:
+        return row | {"why": f"does not agree: {gap:.1e} pu"}, None
+    return row, timed
+
+
+def _expected(
+    problem: FeederProblem,
+    names: list[str],
+    v: NDArray[np.complex128],
+    flags: NDArray[np.int64],
+    state: State,
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
+    """(S, nodes) the product's volts in OpenDSS's order, and which of them mean something."""
+    rows = _rows(problem, names)
+    network = problem.network
+    known = np.stack([v[k, phase] for k, phase in rows], axis=1)
+    loose = {network.node(bus) for bus in unearthed_buses(problem.feeder)}
+    there = np.tile([k not in loose for k, _ in rows], (flags.size, 1))
+    for s in np.flatnonzero(flags & ~(UNEARTHED | NOT_CONVERGED)):
+        below = network.below(int(state.edge[s]))
+        there[s] &= [not (below[k] and flags[s] & UNDEFINED << phase) for k, phase in rows]
+    return known, there
+
+
+def _rows(problem: FeederProblem, names: list[str]) -> list[tuple[int, int]]:
+    at = {bus.upper(): k for k, bus in enumerate(problem.network.nodes)}
+    split = [name.partition(".") for name in names]
+    return [(at[bus], int(phase) - 1) for bus, _, phase in split]
+
+
+def _nominal(problem: FeederProblem, names: list[str]) -> NDArray[np.float64]:
+    volts = bus_volts(problem.feeder)
+    return np.array([volts[problem.network.nodes[k]] for k, _ in _rows(problem, names)])
+
+
+if __name__ == "__main__":
+    main()
