@@ -26,6 +26,7 @@ TITLES = {"constant": "constant impedance", "sampled": "sampled exponents"}
 PARTS = ("draw", "noise", "solve before", "solve after", "measure + evidence", "verdict")
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "dss-python", "power-grid-model")
 SMALL = 100_000  #: scenarios of the small run, to see that memory does not grow
+TIMES_WANTED = 25  #: on mixed events, against OpenDSS's fastest driving
 GROWTH_MB = 20.0  #: what the allocator may keep
 
 Result = dict[str, Any]
@@ -44,6 +45,8 @@ def main() -> int:
     if not asked.no_peers:
         result["peers"] = _run("run_peers.py")
         _print_peers(result["peers"])
+        result["feeders"] = _run("run_feeders.py")
+        _print_feeders(result["feeders"])
     result["machine"]["load_at_end"] = _load()
     print(_load_line(result["machine"]))
     if asked.json:
@@ -234,6 +237,25 @@ def _print_peers(peers: Result) -> None:
         gap = f"{row['gap_pu']:.0e} ({row['tolerance_pu']:g})" if row["gap_pu"] else ""
         times = f"{own / row['per_s']:.1f} × as fast" if gap else ""
         print(f"{row['title']:<24}{row['per_s']:>12,.0f}{times:>16}{gap:>30}")
+
+
+def _print_feeders(feeders: Result) -> None:
+    print("\nMixed events on real feeders, pre-and-post solves per second of processor time,")
+    print(f"engines in turns, one core, median of {REPEATS}; wanted: {TIMES_WANTED} × as fast.\n")
+    if "why" in feeders:
+        print(feeders["why"])
+        return
+    print(f"{'':<46}{'scenarios/s':>12}{'openphase is':>16}{'gap, pu':>10}{'not conv.':>11}")
+    for row in feeders["rows"]:
+        loads = "linear loads" if row["linear"] else "loads by their laws"
+        print(f"{row['feeder'] + ', ' + loads:<46}{row['per_s']:>12,.0f}")
+        for title, peer in row["peers"].items():
+            if "why" in peer:
+                print(f"  {'OpenDSS, ' + title:<44}{peer['why']}")
+                continue
+            times = f"{row['per_s'] / peer['per_s']:.1f} × as fast"
+            cells = f"{times:>16}{peer['gap_pu']:>10.0e}{peer['not_converged']:>11}"
+            print(f"  {'OpenDSS, ' + title:<44}{peer['per_s']:>12,.0f}{cells}")
 
 
 if __name__ == "__main__":

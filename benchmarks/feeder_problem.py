@@ -116,9 +116,7 @@ def _earthed(feeder: Feeder) -> list[int]:
     return [n for n, bus in enumerate(bus_phases(feeder)) if bus not in delta]
 
 
-def _states(
-    feeder: Feeder, network: Network, events: Events, linear: bool
-) -> tuple[State, State]:
+def _states(feeder: Feeder, network: Network, events: Events, linear: bool) -> tuple[State, State]:
     size = events.kind.size
     exponent = np.repeat(network.exponent[:, None], size, axis=1)
     if linear:

@@ -47,6 +47,8 @@ class Circuit:
         self.fault = ""
         self.tell([f"set tolerance={pu!r} maxiterations={MOST_ITERATIONS}"])
         self.tell(["set controlmode=off", "set mode=snap", "solve"])
+        # without the checks that the package makes at every call
+        self.solve = self.engine._api_util.lib.Solution_Solve
 
     def tell(self, commands: Sequence[str]) -> None:
         for command in commands:
@@ -77,7 +79,11 @@ class Circuit:
         self.fault = name
 
     def voltages(self) -> Complex:
-        values: Complex = np.asarray(self.circuit.YNodeVarray, np.float64).view(np.complex128)
+        """The solution itself, which begins with earth."""
+        ffi = self.engine._api_util.ffi
+        start = ffi.cast("char*", self.engine.YMatrix.GetVPointer())
+        raw = ffi.buffer(start, 16 * (self.circuit.NumNodes + 1))
+        values: Complex = np.frombuffer(raw, np.complex128)[1:]
         return values
 
 
@@ -125,14 +131,14 @@ def _shapes(problem: FeederProblem, linear: bool, pu: float) -> Driven:
         intact = circuits[0]
         solution = intact.circuit.Solution
         for s in range(size):
-            solution.Solve()
+            intact.solve()
             good[0, s] = solution.Converged
             out[0, s] = intact.voltages()
         for own, chosen in zip(circuits, kept, strict=True):
             solution = own.circuit.Solution
             for s in chosen:
                 _happen(own, problem, s)
-                solution.Solve()
+                own.solve()
                 good[1, s] = solution.Converged
                 out[1, s] = own.voltages()
         return out[0], out[1], good
@@ -163,7 +169,7 @@ def _direct(problem: FeederProblem, linear: bool, pu: float, contexts: int) -> D
     kw = np.array([load.kw for load in problem.feeder.loads])
     kvar = np.array([load.kvar for load in problem.feeder.loads], np.float64)
     powers = [
-        (np.ascontiguousarray((factor.T * kw)), np.ascontiguousarray(factor.T * kvar))
+        (np.ascontiguousarray(factor.T * kw), np.ascontiguousarray(factor.T * kvar))
         for factor in events.factor
     ]
     for own in circuits:
@@ -181,23 +187,24 @@ def _direct(problem: FeederProblem, linear: bool, pu: float, contexts: int) -> D
         intact, batch = circuits[0], batches[0]
         for s, place in zip(order, where, strict=True):
             if level != 1.0:
+                intact.circuit.Vsources.idx = 1
                 intact.circuit.Vsources.pu = emf
                 level = 1.0
             if contexts == 1:
                 _happen(intact, problem, -1)
             write(batch, 0, s)
-            intact.circuit.Solution.Solve()
+            intact.solve()
             good[0, s] = intact.circuit.Solution.Converged
             out[0, s] = intact.voltages()
             own = circuits[place]
             _happen(own, problem, s)
             if events.source[s] != 1.0:
                 level = events.source[s]
-                own.circuit.Vsources.First
+                own.circuit.Vsources.idx = 1
                 own.circuit.Vsources.pu = emf * level
-            if contexts > 1 or events.kind[s] == 1:
+            if own is not intact or events.kind[s] == 1:
                 write(batches[place], 1, s)
-            own.circuit.Solution.Solve()
+            own.solve()
             good[1, s] = own.circuit.Solution.Converged
             out[1, s] = own.voltages()
         return out[0], out[1], good

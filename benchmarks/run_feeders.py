@@ -1,13 +1,13 @@
 """Mixed events on real feeders: the product and OpenDSS's drivings in turns; prints JSON.
 
 A driving is timed only after its voltages agree with the product's, both solved to a much smaller
-tolerance; nodes beyond a break that nothing feeds, unearthed parts and states that OpenDSS does
-not converge are left out and counted. Times are the process's own, so that a crowded machine
-falls on both alike.
+tolerance; nodes beyond a break that nothing feeds or holds, unearthed parts and states that
+OpenDSS does not converge are left out and counted. Times are the process's own.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
 import statistics
 import sys
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from openphase.model.after import solve_after
 from openphase.model.buses import bus_volts
+from openphase.model.phases import phase_mask
 from openphase.model.solve import solve, steady_state
 from openphase.model.states import NOT_CONVERGED, UNEARTHED, State
 from openphase.studies.run.engine import BLOCK, TOLERANCE_PU
@@ -39,11 +40,11 @@ Row = dict[str, Any]
 
 def main() -> None:
     try:
-        from peer_feeders import DRIVINGS
+        drivings = importlib.import_module("peer_feeders").DRIVINGS
     except ImportError:
         json.dump({"why": "not installed: pip install dss-python"}, sys.stdout)
         return
-    rows = [_row(name, linear, DRIVINGS) for linear in (True, False) for name in FEEDERS]
+    rows = [_row(name, linear, drivings) for linear in (True, False) for name in FEEDERS]
     json.dump({"rows": rows}, sys.stdout)
 
 
@@ -60,6 +61,7 @@ def _row(name: str, linear: bool, drivings: dict[str, Any]) -> Row:
     own: list[float] = []
     spent: dict[str, list[float]] = {title: [] for title in runs}
     for _ in range(REPEATS):
+        own.append(_timed(product))
         for title, run in runs.items():
             own.append(_timed(product))
             spent[title].append(_timed(run))
@@ -130,14 +132,31 @@ def _expected(
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """(S, nodes) the product's volts in OpenDSS's order, and which of them mean something."""
     rows = _rows(problem, names)
-    network = problem.network
+    network, held = problem.network, _held(problem)
     known = np.stack([v[k, phase] for k, phase in rows], axis=1)
     loose = {network.node(bus) for bus in unearthed_buses(problem.feeder)}
     there = np.tile([k not in loose for k, _ in rows], (flags.size, 1))
     for s in np.flatnonzero(flags & ~(UNEARTHED | NOT_CONVERGED)):
         below = network.below(int(state.edge[s]))
         there[s] &= [not (below[k] and flags[s] & UNDEFINED << phase) for k, phase in rows]
+    for s in np.flatnonzero(state.open_mask):
+        below = network.below(int(state.edge[s]))
+        if not state.open_mask[s] & np.bitwise_or.reduce(held[below], initial=0):
+            there[s] &= [not (below[k] and state.open_mask[s] >> phase & 1) for k, phase in rows]
     return known, there
+
+
+def _held(problem: FeederProblem) -> NDArray[np.int64]:
+    """(B,) the phases in which a load or bank hangs on each node.
+
+    Where beyond a break there is none, a line's charging alone holds the conductor, and the
+    1e-12 S that OpenDSS keeps across the break shows.
+    """
+    held = np.zeros(len(problem.network.nodes), np.int64)
+    for part in (*problem.feeder.loads, *problem.feeder.capacitors):
+        if part.place is not None and part.place.bus is not None:
+            held[problem.network.node(part.place.bus)] |= phase_mask(part.phases)
+    return held
 
 
 def _rows(problem: FeederProblem, names: list[str]) -> list[tuple[int, int]]:
