@@ -36,14 +36,14 @@ class TextFile:
         Its name in messages: relative to the folder.
     directory
         The place in the folder from which names in this file count, as its parts.
-    library
+    beside
         Whether it stands beside the folder and may hold catalogues only.
     """
 
     path: Path
     label: str
     directory: tuple[str, ...]
-    library: bool
+    beside: bool
 
 
 @dataclass(slots=True, kw_only=True)
@@ -95,12 +95,12 @@ class Folder:
         else:
             raise NotReadError("is not in the folder")
         target = Path(os.path.realpath(path))
-        library = not target.is_relative_to(self.root)
-        if library and (target.parent, target.name) != (self.root.parent, path.name):
+        beside = not target.is_relative_to(self.root)
+        if beside and (target.parent, target.name) != (self.root.parent, path.name):
             raise NotReadError("leads out of the folder")
-        label = f"../{target.name}" if library else path.relative_to(self.root).as_posix()
-        place = () if library else path.parent.relative_to(self.root).parts
-        return TextFile(path=target, label=label, directory=place, library=library)
+        label = f"../{target.name}" if beside else path.relative_to(self.root).as_posix()
+        place = () if beside else path.parent.relative_to(self.root).parts
+        return TextFile(path=target, label=label, directory=place, beside=beside)
 
     def read_lines(self, file: TextFile) -> list[str]:
         """Return the lines of a file.

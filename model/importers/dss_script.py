@@ -71,7 +71,7 @@ def read_script(path: Path) -> Script:
     if not main.is_file():
         raise InputError.single(str(path), "", None, "is not a file")
     folder = Folder(root=main.parent, max_file_bytes=MAX_FILE_BYTES, max_bytes=MAX_BYTES)
-    file = TextFile(path=main, label=main.name, directory=(), library=False)
+    file = TextFile(path=main, label=main.name, directory=(), beside=False)
     state = State()
     reader = _Reader(folder=folder, state=state, open_files=[], files={}, lines=0)
     reader.read(file, Place(main.name, None))
@@ -131,7 +131,7 @@ class _Reader:
             if in_comment:
                 in_comment = "*/" not in line
                 continue
-            place = Place(file.label, number, file.library)
+            place = Place(file.label, number, file.beside)
             named = obey(self.state, place, line)
             if named is None:
                 continue
@@ -141,7 +141,7 @@ class _Reader:
                     self.read(found, place)
                     if named.moves:
                         self.state.directory = found.directory
-                elif found.library:
+                elif found.beside:
                     raise NotReadError("leads out of the folder")
                 else:
                     rows = self.folder.read_lines(found)
