@@ -15,7 +15,10 @@ from ..model.importers.dss_feeder import Imported, import_opendss
 from ..model.importers.fidelity import Difference, differences
 from ..model.importers.report import fidelity_report
 from ..model.importers.report_text import report_markdown, report_text
+from ..model.leaps import with_leaps
+from ..model.network import compile_network
 from ..model.parts import Feeder
+from ..model.points import find_points, point_probes
 from ..model.reading.feeder_file import write_feeder
 from ..model.reduction.fold import fold
 from ..model.reduction.measure import LEVEL_RANGE, measure
@@ -63,6 +66,7 @@ def import_command(args: argparse.Namespace) -> int:
     _own_data(work, args)
     if args.reduce:
         _fold(work)
+    _count_buses(work)
     report |= {"own_data": [match_json(match) for match in work.matches], **work.parts}
     text = [*report_text(report), *work.lines]
     written = _write(work, args, imported)
@@ -139,6 +143,18 @@ def _fold(work: _Work) -> None:
     work.feeder = folded.feeder
     work.lines += ["", *folded_text(folded, measured)]
     work.parts["reduction"] = folded_json(folded, measured)
+
+
+def _count_buses(work: _Work) -> None:
+    """Say how many buses the solver passes by, since nothing hangs on them."""
+    network = compile_network(work.feeder)
+    probes = point_probes(find_points(work.feeder, network))
+    kept = int((with_leaps(network, probes).tree.passed < 0).sum())
+    work.lines += [
+        "",
+        f"{kept} of {len(network.nodes)} buses are solved; the rest is merged, exactly",
+    ]
+    work.parts["merged"] = {"buses": len(network.nodes), "kept": kept}
 
 
 def _write(work: _Work, args: argparse.Namespace, imported: Imported) -> list[Path]:
