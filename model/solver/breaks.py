@@ -32,6 +32,7 @@ __all__ = [
 ]
 
 Flags = NDArray[np.bool_]
+Row = tuple[complex, complex, complex, complex]  #: a mode's t per voltage above, and alone
 
 DEAD = 1  #: an opened conductor's far side is connected to nothing, or to no source
 FLOATING = 2  #: an opened conductor's far side has equipment, but no way to earth
@@ -90,15 +91,8 @@ def open_phases(mask: int, work: Work, carried: Flags) -> int:
 @compiled
 def replace_phase(a: int, zero: bool, work: Work, carried: Flags) -> None:
     """Put the voltage of an open phase, or zero, in terms of the others."""
-    w, p, x_j, h_j = work.here[0], work.here[1], work.here_j[0], work.here_j[1]
-    here_x, here_h, xt, u, u_j, row = (
-        work.here_x,
-        work.here_h,
-        work.xt,
-        work.u,
-        work.u_j,
-        work.row,
-    )
+    w, p, x_j = work.here[0], work.here[1], work.here_j[0]
+    here_x, xt, row = work.here_x, work.xt, work.row
     scale = 0j if zero else -reciprocal(w[a, a])
     own0, own1, own2, own_j = scale * w[a, 0], scale * w[a, 1], scale * w[a, 2], scale * x_j[a]
     if a == 0:
@@ -112,37 +106,50 @@ def replace_phase(a: int, zero: bool, work: Work, carried: Flags) -> None:
         if carried[c]:
             for j in range(3):
                 row[c, j] = scale * here_x[c, a, j]
+    own = (own0, own1, own2, own_j)
     for i in range(3):
-        from_w, from_p = w[i, a], p[i, a]
-        w[i, 0] += from_w * own0
-        w[i, 1] += from_w * own1
-        w[i, 2] += from_w * own2
-        p[i, 0] += from_p * own0
-        p[i, 1] += from_p * own1
-        p[i, 2] += from_p * own2
-        x_j[i] += from_w * own_j
-        h_j[i] += from_p * own_j
+        add_row(work, carried, i, (w[i, a], p[i, a]), own)
         w[i, a] = p[i, a] = 0.0
         for c in range(chords):
             if carried[c]:
-                from_xt = xt[c, i, a]
-                xt[c, i, 0] += from_xt * own0
-                xt[c, i, 1] += from_xt * own1
-                xt[c, i, 2] += from_xt * own2
-                u_j[c, i] += from_xt * own_j
+                add_fork_row(work, carried, (c, i), xt[c, i, a], own)
                 xt[c, i, a] = 0.0
-                for j in range(3):
-                    here_x[c, i, j] += from_w * row[c, j]
-                    here_h[c, i, j] += from_p * row[c, j]
-                    for d in range(chords):
-                        if carried[d]:
-                            u[c, d, i, j] += from_xt * row[d, j]
     for j in range(3):
         w[a, j] = 0.0
         for c in range(chords):
             if carried[c]:
                 here_x[c, a, j] = 0.0
     x_j[a] = 0.0
+
+
+@compiled
+def add_row(work: Work, carried: Flags, i: int, factors: tuple[complex, complex], own: Row) -> None:
+    """Add to row i of W, X and x, and of P, H and h, the row of the mode times a factor."""
+    w, p, from_w, from_p = work.here[0], work.here[1], factors[0], factors[1]
+    for j in range(3):
+        w[i, j] += from_w * own[j]
+        p[i, j] += from_p * own[j]
+    work.here_j[0, i] += from_w * own[3]
+    work.here_j[1, i] += from_p * own[3]
+    for c in range(carried.size):
+        if carried[c]:
+            for j in range(3):
+                work.here_x[c, i, j] += from_w * work.row[c, j]
+                work.here_h[c, i, j] += from_p * work.row[c, j]
+
+
+@compiled
+def add_fork_row(
+    work: Work, carried: Flags, where: tuple[int, int], factor: complex, own: Row
+) -> None:
+    """Add to a row of a loop's X', U and u the row of the mode times a factor."""
+    c, i = where
+    for j in range(3):
+        work.xt[c, i, j] += factor * own[j]
+        for d in range(carried.size):
+            if carried[d]:
+                work.u[c, d, i, j] += factor * work.row[d, j]
+    work.u_j[c, i] += factor * own[3]
 
 
 @compiled_apart
@@ -152,15 +159,8 @@ def free_modes(tree: Tree, k: int, work: Work, carried: Flags) -> int:
     Like ``open_phases``, from any mode. Where the network below does not hold it either, it
     gets no voltage, and a flag.
     """
-    w, p, x_j, h_j = work.here[0], work.here[1], work.here_j[0], work.here_j[1]
-    here_x, here_h, xt, u, u_j, row = (
-        work.here_x,
-        work.here_h,
-        work.xt,
-        work.u,
-        work.u_j,
-        work.row,
-    )
+    p, x_j = work.here[1], work.here_j[0]
+    here_x, xt, row = work.here_x, work.xt, work.row
     limit = start(work, carried)
     chords = carried.size
     flags = 0
@@ -173,8 +173,8 @@ def free_modes(tree: Tree, k: int, work: Work, carried: Flags) -> int:
             flags |= UNEARTHED
             continue
         scale = -reciprocal(driving)
-        own0, own1, own2 = scale * own0, scale * own1, scale * own2
         own_j = scale * (e[0] * x_j[0] + e[1] * x_j[1] + e[2] * x_j[2])
+        own = (scale * own0, scale * own1, scale * own2, own_j)
         for c in range(chords):
             if carried[c]:
                 for j in range(3):
@@ -184,27 +184,11 @@ def free_modes(tree: Tree, k: int, work: Work, carried: Flags) -> int:
         for i in range(3):
             from_w = from0 if i == 0 else (from1 if i == 1 else from2)
             from_p = p[i, 0] * e[0] + p[i, 1] * e[1] + p[i, 2] * e[2]
-            w[i, 0] += from_w * own0
-            w[i, 1] += from_w * own1
-            w[i, 2] += from_w * own2
-            p[i, 0] += from_p * own0
-            p[i, 1] += from_p * own1
-            p[i, 2] += from_p * own2
-            x_j[i] += from_w * own_j
-            h_j[i] += from_p * own_j
+            add_row(work, carried, i, (from_w, from_p), own)
             for c in range(chords):
                 if carried[c]:
                     from_xt = xt[c, i, 0] * e[0] + xt[c, i, 1] * e[1] + xt[c, i, 2] * e[2]
-                    xt[c, i, 0] += from_xt * own0
-                    xt[c, i, 1] += from_xt * own1
-                    xt[c, i, 2] += from_xt * own2
-                    u_j[c, i] += from_xt * own_j
-                    for j in range(3):
-                        here_x[c, i, j] += from_w * row[c, j]
-                        here_h[c, i, j] += from_p * row[c, j]
-                        for d in range(chords):
-                            if carried[d]:
-                                u[c, d, i, j] += from_xt * row[d, j]
+                    add_fork_row(work, carried, (c, i), from_xt, own)
     return flags
 
 
