@@ -13,7 +13,13 @@ from ..states import State, Tree, Work
 from .bank import YG_D, bank, plain_bank
 from .matrix3 import ZERO, add, load, load_vector, plus, scaled, store, store_vector
 
-__all__ = ["add_circulant", "set_admittances"]
+__all__ = [
+    "add_machine",
+    "add_shunt",
+    "hang_bank",
+    "set_admittances",
+    "set_event_shunts",
+]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -140,10 +146,7 @@ def hang_bank(tree: Tree, work: Work, unit: int, connection: int) -> None:
 @compiled
 def set_units(tree: Tree, state: State, work: Work, s: int, floor_pu: float) -> None:
     """Admittance across the LV windings of every unit, and the current fed in there."""
-    unit_y, unit_j, v_pu, unit_v = work.unit_y, work.unit_j, work.winding_v_pu, tree.unit_v
-    load_unit, machine_unit = tree.load_unit, tree.machine_unit
-    machine_va, machine_y, machine_j = state.machine_va, state.machine_y_s, state.machine_j_a
-    follows = state.machine_exponent
+    unit_y, unit_j, v_pu, load_unit = work.unit_y, work.unit_j, work.winding_v_pu, tree.load_unit
     if unit_y.shape[0] == 0:
         return
     for unit in range(unit_y.shape[0]):
@@ -155,21 +158,28 @@ def set_units(tree: Tree, state: State, work: Work, s: int, floor_pu: float) -> 
             for i in range(3):
                 own = load_admittance(tree, state, n, s, v_pu[4 * unit + i], floor_pu)
                 unit_y[unit, i, i] += own
-    turn = complex(-0.5, 0.75**0.5)
-    for m in range(machine_unit.size):
-        unit = machine_unit[m]
-        power = follows[m, s] - 2.0
-        taken = machine_va[m, s].conjugate() / (3.0 * unit_v[unit] ** 2)
-        y0, y2 = machine_y[m, 0, s], machine_y[m, 2, s]
-        y1 = machine_y[m, 1, s] + taken * voltage_factor(v_pu[4 * unit + 3], power, floor_pu)
-        own = (y0 + y1 + y2) / 3.0
-        ahead = (y0 + turn * y1 + turn.conjugate() * y2) / 3.0
-        behind = (y0 + turn.conjugate() * y1 + turn * y2) / 3.0
-        add_circulant(unit_y, unit, own, ahead, behind)
-        j = machine_j[m, s]
-        store_vector(
-            unit_j, unit, plus(load_vector(unit_j, unit), (j, j * turn.conjugate(), j * turn))
-        )
+    for m in range(tree.machine_unit.size):
+        add_machine(tree, state, work, m, s, floor_pu)
+
+
+@compiled
+def add_machine(tree: Tree, state: State, work: Work, m: int, s: int, floor_pu: float) -> None:
+    """What machine m puts across the LV windings of its unit."""
+    unit_y, unit_j, unit = work.unit_y, work.unit_j, tree.machine_unit[m]
+    machine_y, turn = state.machine_y_s, complex(-0.5, 0.75**0.5)
+    power = state.machine_exponent[m, s] - 2.0
+    taken = state.machine_va[m, s].conjugate() / (3.0 * tree.unit_v[unit] ** 2)
+    y0, y2 = machine_y[m, 0, s], machine_y[m, 2, s]
+    v1_pu = work.winding_v_pu[4 * unit + 3]
+    y1 = machine_y[m, 1, s] + taken * voltage_factor(v1_pu, power, floor_pu)
+    own = (y0 + y1 + y2) / 3.0
+    ahead = (y0 + turn * y1 + turn.conjugate() * y2) / 3.0
+    behind = (y0 + turn.conjugate() * y1 + turn * y2) / 3.0
+    add_circulant(unit_y, unit, own, ahead, behind)
+    j = state.machine_j_a[m, s]
+    store_vector(
+        unit_j, unit, plus(load_vector(unit_j, unit), (j, j * turn.conjugate(), j * turn))
+    )
 
 
 @compiled

@@ -37,15 +37,10 @@ from ..compiled import compiled, compiled_apart, compiled_door
 from ..states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from .assemble import set_admittances
 from .breaks import FLOATING, NOTHING_S, SINGULAR, squared
-from .corrections import (
-    can_correct,
-    climb_corrections,
-    leaps_to_take_apart,
-    set_corrections,
-)
 from .event_node import BELOW, climb_event, climb_loose, descend_event
 from .loops import carry_fill, climb_chord, descend_chord_event, hand_up
 from .matrix3 import (
+    Matrix,
     Vector,
     add,
     column_sums,
@@ -63,9 +58,14 @@ from .series import carry_current, per_fork, up
 from .settle import is_linear, positive, see_magnitudes, update_magnitudes
 from .turns import turn_edge
 
-__all__ = ["solve_block"]
-
-CORRECTED_PASSES = 12  #: what has not settled by then is eliminated in every pass
+__all__ = [
+    "climb_edge",
+    "descend_edge",
+    "edge_current",
+    "is_sourced",
+    "neutral_shift",
+    "solve_block",
+]
 
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
@@ -77,38 +77,21 @@ def climb(tree: Tree, state: State, work: Work, s: int) -> int:
 
     ``work.y`` holds each node's own admittance and becomes the admittance below it.
     """
-    lone, z_all, y_all, f_all, w_all = tree.lone_phase, tree.z_ohm, work.y, work.f, work.w
-    parents, passed, leaps, edge = tree.parent, tree.passed, tree.leap, state.edge[s]
+    fed = is_sourced(tree)
     flags = 0
-    needed, needed_too = leaps_to_take_apart(tree, edge, state.far_node[s])
-    for q in range(tree.twigs):
-        if q != needed and q != needed_too:
-            k = tree.leap_from[q]
-            store(y_all, k, add(load(y_all, k), load(tree.leap_up_s, q)))
-    for k in range(parents.size - 1, -1, -1):
-        leap = passed[k]
-        if leap >= 0 and leap != needed and leap != needed_too:
-            continue
-        a, leap = lone[k], leaps[k]
-        if leap >= 0 and leap != needed and leap != needed_too:
-            climb_leap(tree, work, k, leap)
-        elif a >= 0 and k != edge:
-            y1 = y_all[k, a, a]
-            f1 = reciprocal(1.0 + z_all[k, a, a] * y1)
-            f_all[k, a, a] = f1
-            y1 *= f1
-            w_all[k, a, a] = y1
-            y_all[parents[k], a, a] += y1
-        else:
-            flags |= climb_edge(tree, state, work, k, s)
+    for k in range(tree.parent.size - 1, -1, -1):
+        flags |= climb_edge(tree, state, work, k, s, fed)
     return flags
 
 
 @compiled
-def climb_edge(tree: Tree, state: State, work: Work, k: int, s: int) -> int:
-    """Eliminate node k and the edge above it, whatever they are; returns flags."""
+def climb_edge(tree: Tree, state: State, work: Work, k: int, s: int, fed: bool) -> int:
+    """Eliminate node k and the edge above it, whatever they are; returns flags.
+
+    ``fed``: currents are fed in that no voltage drives.
+    """
     in_loop, y_all, y_j, x_j = tree.in_loop[k], work.y, work.y_j, work.x_j
-    sourced, turned = is_sourced(tree), tree.regulator[k] >= 0 or tree.transformer[k] >= 0
+    turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
     flags = 0
     for c in range(tree.tail.size):
         if tree.tail[c] == k:
@@ -126,7 +109,7 @@ def climb_edge(tree: Tree, state: State, work: Work, k: int, s: int) -> int:
         f, w = up(y, z)
         store(work.f, k, f)
         store(work.w, k, w)
-        if sourced:
+        if fed:
             ahead, drawn = carry_current(y, z, f, drawn, work, carried)
             store_vector(work.h_j, k, ahead)
             store_vector(x_j, k, drawn)
@@ -137,7 +120,7 @@ def climb_edge(tree: Tree, state: State, work: Work, k: int, s: int) -> int:
     parent = tree.parent[k]
     if parent >= 0:
         store(y_all, parent, add(load(y_all, parent), load(work.w, k)))
-        if sourced:
+        if fed:
             store_vector(y_j, parent, plus(load_vector(y_j, parent), load_vector(x_j, k)))
         if in_loop:
             hand_up(tree, work, k, parent)
@@ -150,47 +133,24 @@ def is_sourced(tree: Tree) -> bool:
     return bool(tree.machine_unit.size > 0)
 
 
-@compiled
-def climb_leap(tree: Tree, work: Work, k: int, leap: int) -> None:
-    """Eliminate all the edges of a leap at once, at whose end node k is."""
-    a, above = tree.lone_phase[k], tree.leap_from[leap]
-    y_all, up_s, low_s = work.y, tree.leap_up_s, tree.leap_low_s
-    if a >= 0:
-        y1 = y_all[k, a, a] + low_s[leap, a, a]
-        f1 = reciprocal(1.0 + tree.leap_z_ohm[leap, a, a] * y1)
-        work.f[k, a, a] = f1
-        y_all[above, a, a] += y1 * f1 + up_s[leap, a, a]
-        return
-    y, z = add(load(y_all, k), load(low_s, leap)), load(tree.leap_z_ohm, leap)
-    f, w = up(y, z)
-    store(work.f, k, f)
-    store(y_all, above, add(load(y_all, above), add(w, load(up_s, leap))))
-    if is_sourced(tree):
-        none = tree.carried[k]
-        ahead, drawn = carry_current(y, z, f, load_vector(work.y_j, k), work, none)
-        store_vector(work.h_j, k, ahead)
-        store_vector(work.y_j, above, plus(load_vector(work.y_j, above), drawn))
-
-
 @compiled_apart
-def lift_neutral(tree: Tree, work: Work) -> int:
-    """Shift the EMF (last row of V) by the neutral's voltage; returns flags.
+def neutral_shift(
+    w: Matrix, emf: Vector, current: Vector, neutral_y_s: complex
+) -> tuple[int, Vector]:
+    """Flags, and the EMF shifted by the neutral's voltage.
 
     The source's currents sum to what leaves the neutral. An impedance there, in the source's
     zero sequence, would be thousands of times all others and cost as much in digits.
     """
-    last = work.y.shape[0]
-    w, emf = load(work.w, 0), load_vector(work.v, last)
-    sums, current = column_sums(w), plus(times(w, emf), load_vector(work.x_j, 0))
-    total = sums[0] + sums[1] + sums[2] + tree.neutral_y_s
+    sums, drawn = column_sums(w), plus(times(w, emf), current)
+    total = sums[0] + sums[1] + sums[2] + neutral_y_s
     largest = 0.0
-    for i in range(9):
-        largest = max(largest, squared(w[i]))
+    for one in w:
+        largest = max(largest, squared(one))
     if squared(total) <= max(SINGULAR**2 * largest, NOTHING_S**2):
-        return FLOATING
-    shift = -(current[0] + current[1] + current[2]) * reciprocal(total)
-    store_vector(work.v, last, plus(emf, (shift, shift, shift)))
-    return 0
+        return FLOATING, emf
+    shift = -(drawn[0] + drawn[1] + drawn[2]) * reciprocal(total)
+    return 0, plus(emf, (shift, shift, shift))
 
 
 @compiled
@@ -199,45 +159,42 @@ def descend(tree: Tree, state: State, work: Work, s: int, fed: bool) -> None:
 
     ``fed``: currents are fed in that no voltage drives.
     """
-    parents, in_loop, lone, phases = tree.parent, tree.in_loop, tree.lone_phase, tree.phases
-    v_all, f_all, fork = work.v, work.f, tree.fork
-    passed, leaps = tree.passed, tree.leap
-    edge, share, mask = state.edge[s], state.share[s], state.open_mask[s]
-    last = parents.size
-    needed, needed_too = leaps_to_take_apart(tree, edge, state.far_node[s])
+    last, edge = tree.parent.size, state.edge[s]
     for k in range(last):
-        leap = passed[k]
-        if leap >= 0 and leap != needed and leap != needed_too:
-            continue
-        leap, parent = leaps[k], parents[k]
-        if leap >= 0 and leap != needed and leap != needed_too:
-            parent = tree.leap_from[leap]
-        a = lone[k]
-        if a >= 0 and k != edge:
-            v_all[k, a] = f_all[k, a, a] * v_all[parent, a]
-            if fed:
-                v_all[k, a] += work.h_j[k, a]
-            continue
-        above = load_vector(v_all, parent if k else last)
-        carried = tree.carried[k]
-        if k == edge:
-            v = descend_event(tree, work, 0, above, mask, carried)
-            v = plus(times(load(work.event, BELOW), v), load_vector(work.event_j, BELOW))
-            v = per_fork(work.event_h[BELOW], carried, fork, v_all, v)
-        else:
-            v = times(load(f_all, k), above)
-            if in_loop[k]:
-                v = per_fork(work.h[k], carried, fork, v_all, v)
-            if fed:
-                v = plus(v, load_vector(work.h_j, k))
-        store_vector(v_all, k, v)
-        if tree.node_phases[k] != 7:
-            keep_phases(v_all, k, tree.node_phases[k])
+        descend_edge(tree, state, work, k, s, fed)
     if edge >= last:
-        descend_chord_event(tree, work, edge - last, share, mask)
-    if edge >= 0 and phases[edge] != 7:
-        keep_phases(work.stub, 0, phases[edge])
-        keep_phases(work.stub, 1, phases[edge])
+        descend_chord_event(tree, work, edge - last, state.share[s], state.open_mask[s])
+        keep_stubs(tree, work, edge)
+
+
+@compiled
+def descend_edge(tree: Tree, state: State, work: Work, k: int, s: int, fed: bool) -> None:
+    """The voltage of node k, from that above it."""
+    v_all, fork, carried = work.v, tree.fork, tree.carried[k]
+    above = load_vector(v_all, tree.parent[k] if k else tree.parent.size)
+    if k == state.edge[s]:
+        v = descend_event(tree, work, 0, above, state.open_mask[s], carried)
+        v = plus(times(load(work.event, BELOW), v), load_vector(work.event_j, BELOW))
+        v = per_fork(work.event_h[BELOW], carried, fork, v_all, v)
+        keep_stubs(tree, work, k)
+    else:
+        v = times(load(work.f, k), above)
+        if tree.in_loop[k]:
+            v = per_fork(work.h[k], carried, fork, v_all, v)
+        if fed:
+            v = plus(v, load_vector(work.h_j, k))
+    store_vector(v_all, k, v)
+    if tree.node_phases[k] != 7:
+        keep_phases(v_all, k, tree.node_phases[k])
+
+
+@compiled
+def keep_stubs(tree: Tree, work: Work, edge: int) -> None:
+    """Zero at the event node for phases that its edge does not have."""
+    phases = tree.phases[edge]
+    if phases != 7:
+        keep_phases(work.stub, 0, phases)
+        keep_phases(work.stub, 1, phases)
 
 
 @compiled
@@ -317,7 +274,7 @@ def solve_block(
     v_node, i_edge, i_below = probes.v_node, probes.i_edge, probes.i_below
     v_out, i_out, stub_out, winding_out = answer.v, answer.i, answer.stub, answer.winding_v_pu
     v, stub, winding_v_pu, history = work.v, work.stub, work.winding_v_pu, work.history
-    turn = np.exp(-2j * np.pi / 3)
+    turn, fed = np.exp(-2j * np.pi / 3), is_sourced(tree)
     for s in range(state.emf_pu.size):
         linear = is_linear(tree, state, s)
         emf = state.emf_pu[s] * tree.v_nominal_v * tree.emf_turn
@@ -326,24 +283,19 @@ def solve_block(
         for n in range(winding_v_pu.size):
             winding_v_pu[n] = winding_out[n, s]
             history[0, n] = history[1, n] = 0.0
-        correctable = not linear and can_correct(tree, state, s)
-        settled = fed = False
+        settled = False
         flags = 0
         passes = 0
         while not settled and passes < most_passes:
             passes += 1
-            corrected = correctable and 1 < passes <= CORRECTED_PASSES
-            if corrected:
-                corrected = set_corrections(tree, state, work, s, floor_pu)
-            if corrected:
-                climb_corrections(tree, state, work, s)
-            else:
-                set_admittances(tree, state, work, s, floor_pu)
-                flags = climb(tree, state, work, s)
+            set_admittances(tree, state, work, s, floor_pu)
+            flags = climb(tree, state, work, s)
             store_vector(v, last, (emf, emf * turn, emf * turn.conjugate()))
             if tree.lifted:
-                flags |= lift_neutral(tree, work)
-            fed = corrected or is_sourced(tree)
+                w, drawn = load(work.w, 0), load_vector(work.x_j, 0)
+                more, lifted = neutral_shift(w, load_vector(v, last), drawn, tree.neutral_y_s)
+                store_vector(v, last, lifted)
+                flags |= more
             descend(tree, state, work, s, fed)
             settled = linear or update_magnitudes(tree, state, work, s, passes) <= tolerance_pu
         if linear:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
+from ..lanes import joined
 
 __all__ = [
     "IDENTITY",
@@ -228,7 +229,7 @@ def times(a: Matrix, v: Vector) -> Vector:
 def reciprocal(x: complex) -> complex:
     """``1 / x`` without the library's rescaling; infinite at zero."""
     factor = 1.0 / (x.real * x.real + x.imag * x.imag)
-    return complex(x.real * factor, -x.imag * factor)
+    return joined(x.real * factor, -x.imag * factor)
 
 
 @compiled

@@ -1,0 +1,1 @@
+"""The ladder for eight scenarios at a time, where nothing loops."""

@@ -1,0 +1,262 @@
+"""Up the ladder in lanes; a region where something happens is climbed lane by lane."""
+
+from __future__ import annotations
+
+from ...compiled import compiled
+from ...lanes import WIDTH, joined, load_real, splat
+from ...states import State, Tree, Work
+from ..ladder import climb_edge
+from ..matrix3 import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Vector,
+    add,
+    inverse,
+    load,
+    load_vector,
+    minus,
+    plus,
+    plus_diagonal,
+    product,
+    reciprocal,
+    store,
+    store_vector,
+    times,
+)
+from ..series import up
+from ..turns import transposed
+from .rows import (
+    add_matrix,
+    add_vector,
+    load_entry,
+    load_matrix,
+    load_triple,
+    put_lane,
+    put_lane_vector,
+    store_entry,
+    store_matrix,
+    store_triple,
+    take_lane,
+    take_lane_vector,
+)
+from .work import ALL, PASSED, TWIG, Wide, lane_of
+
+__all__ = ["climb", "mark_regions", "turn_of"]
+
+
+@compiled
+def mark_regions(tree: Tree, state: State, wide: Wide, s: int) -> None:
+    """Note in ``busy`` where something happens, and in which lanes."""
+    busy = wide.busy
+    for k in range(busy.size):
+        busy[k] = ALL if wide.loose[k] else 0
+    for lane in range(WIDTH):
+        edge, far = state.edge[s + lane], state.far_node[s + lane]
+        if edge >= 0:
+            q = max(tree.passed[edge], tree.leap[edge])
+            busy[wide.place[q] if q >= 0 else edge] |= 1 << lane
+        if far >= 0 and tree.passed[far] >= 0:
+            busy[wide.place[tree.passed[far]]] |= 1 << lane
+
+
+@compiled
+def climb(
+    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, how: tuple[int, bool, bool]
+) -> None:
+    """Eliminate every node from the leaves to the source, or only carry currents up.
+
+    ``how``: the lanes eliminated anew, whether there are any, and whether there are currents
+    that no voltage drives.
+    """
+    demand, full, fed = how
+    lone, visits = tree.lone_phase, wide.visit
+    for k in range(visits.size - 1, -1, -1):
+        visit = visits[k]
+        if visit == PASSED:
+            continue
+        a, busy, above = lone[k], wide.busy[k], wide.above[k]
+        if visit == TWIG:
+            if full:
+                shunt = load(tree.leap_chain[wide.leap[k]], 2)
+                if busy == 0:
+                    add_matrix(wide.y, above, shunt)
+                    continue
+                store_matrix(wide.w, k, in_lanes(shunt))
+            elif busy == 0:
+                continue
+        elif busy != ALL:
+            if a >= 0:
+                climb_lone(tree, wide, k, a, full, fed)
+            else:
+                climb_whole(tree, state, wide, k, s, full, fed)
+        if busy:
+            for lane in range(WIDTH):
+                if busy >> lane & 1:
+                    work = lane_of(lanes, lane)
+                    flags = climb_region(tree, state, wide, work, k, (lane, s + lane, fed))
+                    if demand >> lane & 1:
+                        wide.flags[lane] |= flags
+        if k == 0:
+            continue
+        if a >= 0 and visit != TWIG:
+            if full:
+                y1 = load_entry(wide.y, above, 4 * a) + load_entry(wide.w, k, 4 * a)
+                store_entry(wide.y, above, 4 * a, y1)
+            if fed:
+                drawn1 = load_entry(wide.y_j, above, a) + load_entry(wide.x_j, k, a)
+                store_entry(wide.y_j, above, a, drawn1)
+            continue
+        if full:
+            add_matrix(wide.y, above, load_matrix(wide.w, k))
+        if fed and visit != TWIG:
+            add_vector(wide.y_j, above, load_triple(wide.x_j, k))
+
+
+@compiled
+def in_lanes(shunt: Matrix) -> Matrix:
+    """The same in every lane."""
+    one = joined(splat(1.0), splat(0.0))
+    return (
+        one * shunt[0],
+        one * shunt[1],
+        one * shunt[2],
+        one * shunt[3],
+        one * shunt[4],
+        one * shunt[5],
+        one * shunt[6],
+        one * shunt[7],
+        one * shunt[8],
+    )
+
+
+@compiled
+def climb_lone(tree: Tree, wide: Wide, k: int, a: int, full: bool, fed: bool) -> None:
+    """Past an edge, or a leap, that has a single phase."""
+    y, q = load_entry(wide.y, k, 4 * a), wide.leap[k]
+    if q < 0:
+        z = tree.z_ohm[k, a, a]
+        if full:
+            f = reciprocal(1.0 + z * y)
+            store_entry(wide.f, k, 4 * a, f)
+            store_entry(wide.w, k, 4 * a, y * f)
+        if fed:
+            drawn = load_entry(wide.y_j, k, a)
+            ahead = -(load_entry(wide.f, k, 4 * a) * (z * drawn))
+            store_entry(wide.h_j, k, a, ahead)
+            store_entry(wide.x_j, k, a, drawn + y * ahead)
+        return
+    chain = tree.leap_chain[q]
+    if full:
+        f = reciprocal(chain[0, a, a] + chain[1, a, a] * y)
+        store_entry(wide.f, k, 4 * a, f)
+        store_entry(wide.w, k, 4 * a, (chain[2, a, a] + chain[3, a, a] * y) * f)
+    if fed:
+        drawn = load_entry(wide.y_j, k, a)
+        ahead = -(load_entry(wide.f, k, 4 * a) * (chain[1, a, a] * drawn))
+        store_entry(wide.h_j, k, a, ahead)
+        drawn = chain[3, a, a] * (drawn + y * ahead) + chain[2, a, a] * ahead
+        store_entry(wide.x_j, k, a, drawn)
+
+
+@compiled
+def climb_whole(
+    tree: Tree, state: State, wide: Wide, k: int, s: int, full: bool, fed: bool
+) -> None:
+    """Past an edge, or a leap, of several phases, and what stands at its upper end."""
+    y, q = load_matrix(wide.y, k), wide.leap[k]
+    turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
+    if full:
+        if q < 0:
+            f, w = up(y, load(tree.z_ohm, k))
+        else:
+            chain = tree.leap_chain[q]
+            f = inverse(add(product(load(chain, 1), y), load(chain, 0)))
+            w = product(add(product(load(chain, 3), y), load(chain, 2)), f)
+        if turned:
+            t = turn_of(tree, state, wide, k, s)
+            f, w = product(f, t), product(transposed(t), product(w, t))
+        store_matrix(wide.f, k, f)
+        store_matrix(wide.w, k, w)
+    if fed:
+        drawn = load_triple(wide.y_j, k)
+        ahead, seen = carry_current(tree, wide, (y, load_matrix(wide.f, k)), (k, q), drawn, turned)
+        if turned:
+            seen = times(transposed(turn_of(tree, state, wide, k, s)), seen)
+        store_triple(wide.h_j, k, ahead)
+        store_triple(wide.x_j, k, seen)
+
+
+@compiled
+def carry_current(
+    tree: Tree,
+    wide: Wide,
+    own: tuple[Matrix, Matrix],
+    where: tuple[int, int],
+    drawn: Vector,
+    turned: bool,
+) -> tuple[Vector, Vector]:
+    """What a current drawn below makes of the voltage there, and is seen as from above.
+
+    ``own`` are Y and F of the edge and leap ``where``. F of a turned edge, which has T in it, is
+    made anew.
+    """
+    y, f = own
+    k, q = where
+    if q >= 0:
+        chain = tree.leap_chain[q]
+        ahead = minus(times(f, times(load(chain, 1), drawn)))
+        seen = plus(drawn, times(y, ahead))
+        return ahead, plus(times(load(chain, 3), seen), times(load(chain, 2), ahead))
+    z = load(tree.z_ohm, k)
+    if turned:
+        f = inverse(plus_diagonal(product(z, y), (1 + 0j, 1 + 0j, 1 + 0j)))
+    ahead = minus(times(f, times(z, drawn)))
+    return ahead, plus(drawn, times(y, ahead))
+
+
+@compiled
+def turn_of(tree: Tree, state: State, wide: Wide, k: int, s: int) -> Matrix:
+    """T of what stands at the upper end of edge k, as ``turns.turn_of``."""
+    row = tree.regulator[k]
+    if row < 0:
+        return in_lanes(load(tree.turn, tree.transformer[k]))
+    t, reference = wide.turn, tree.reference
+    store_matrix(t, 0, in_lanes(IDENTITY))
+    for i in range(3):
+        more = load_real(state.ratio, (row, i, s)) - 1.0
+        store_entry(t, 0, 4 * i, load_entry(t, 0, 4 * i) + more)
+        if reference[row, i] >= 0:
+            across = 3 * i + reference[row, i]
+            store_entry(t, 0, across, load_entry(t, 0, across) - more)
+    return load_matrix(t, 0)
+
+
+@compiled
+def climb_region(
+    tree: Tree, state: State, wide: Wide, work: Work, k: int, where: tuple[int, int, bool]
+) -> int:
+    """One lane past the region at node k, edge by edge; returns flags.
+
+    ``where`` is the lane, its scenario, and whether there are currents that no voltage drives.
+    """
+    lane, s, fed = where
+    top, q = wide.above[k], wide.leap[k]
+    twig = wide.visit[k] == TWIG
+    if not twig:
+        take_lane(wide.y, k, lane, work.y, k)
+        if fed:
+            take_lane_vector(wide.y_j, k, lane, work.y_j, k)
+        else:
+            store_vector(work.y_j, k, (0j, 0j, 0j))
+    store(work.y, top, ZERO)
+    store_vector(work.y_j, top, (0j, 0j, 0j))
+    flags = 0
+    if q < 0:
+        flags = climb_edge(tree, state, work, k, s, fed)
+    else:
+        for n in range(tree.region_from[q], tree.region_from[q + 1]):
+            flags |= climb_edge(tree, state, work, tree.region_node[n], s, fed)
+    put_lane(wide.w, k, lane, work.y, top)
+    put_lane_vector(wide.x_j, k, lane, work.y_j, top)
+    return flags

@@ -1,0 +1,252 @@
+"""What hangs on the nodes of eight scenarios: loads, banks, and the event's shunts."""
+
+from __future__ import annotations
+
+from ...compiled import compiled
+from ...lanes import WIDTH, bits_of, load_real, mask_of, select, splat, store_real
+from ...states import State, Tree, Work
+from ..assemble import add_machine, add_shunt, hang_bank, set_event_shunts
+from ..bank import D_YG, YG_D, YG_YG
+from ..bank_forms import delta_wye, wye_delta, wye_wye
+from ..matrix3 import ZERO, Matrix, load, store, store_vector
+from .loads import load_admittance
+from .rows import (
+    add_lane,
+    add_lane_vector,
+    add_matrix,
+    chosen,
+    load_entry,
+    load_matrix,
+    load_triple,
+    put_lane,
+    put_lane_vector,
+    store_entry,
+    store_matrix,
+)
+from .work import ALL, Wide, lane_of
+
+__all__ = ["find_demand", "leap_at", "set_region_shunts", "set_shunts"]
+
+NEAR = 0.2  #: an admittance farther from the eliminated one than this share needs a new elimination
+
+
+@compiled
+def find_demand(tree: Tree, state: State, wide: Wide, s: int, floor_pu: float) -> int:
+    """Branches at their voltages; returns the bits of the lanes that must be eliminated anew.
+
+    Where admittances have changed little since, what they draw more than then is a current at
+    their node, which goes up and down with the matrices that stand there.
+    """
+    at = 4 * (tree.unit_node.size + 1)
+    v_pu, own_y, eliminated = wide.winding_v_pu, wide.branch_own, wide.branch_y
+    demand = mask_of(0)
+    for p in range(tree.branch_node.size):
+        n = tree.branch_load[p]
+        own = load_admittance(tree, state, n, s, load_real(v_pu, (at + p, 0)), floor_pu)
+        store_entry(own_y, p, 0, own)
+        past = load_entry(eliminated, p, 0)
+        more = own - past
+        demand = demand | (size2(more) > NEAR**2 * size2(past))
+    return bits_of(demand)
+
+
+@compiled
+def size2(value: complex) -> float:
+    """``|value|**2``."""
+    return value.real * value.real + value.imag * value.imag
+
+
+@compiled
+def set_shunts(
+    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, how: tuple[int, bool, bool], floor_pu: float
+) -> None:
+    """Everything on the nodes but what happens in regions.
+
+    ``how``: the lanes to be eliminated anew, whether there are any, and whether there are
+    currents that no voltage drives.
+    """
+    demand, full, fed = how
+    y, y_j, v = wide.y, wide.y_j, wide.v
+    nothing = splat(0.0)
+    if fed:
+        for k in range(y_j.shape[0]):
+            for i in range(6):
+                store_real(y_j, (k, i, 0), nothing)
+    if full:
+        for k in range(y.shape[0]):
+            for i in range(9):
+                store_entry(y, k, i, nothing + complex(tree.shunt_s[k, i // 3, i % 3]))
+        hang_units(tree, state, wide, lanes, s, floor_pu)
+    renewed = mask_of(demand)
+    node, first, other = tree.branch_node, tree.branch_from, tree.branch_to
+    for p in range(node.size):
+        k, i, j = node[p], first[p], other[p]
+        own, taken = load_entry(wide.branch_own, p, 0), load_entry(wide.branch_y, p, 0)
+        taken = select(renewed, own, taken)
+        if full:
+            store_entry(wide.branch_y, p, 0, taken)
+            store_entry(y, k, 4 * i, load_entry(y, k, 4 * i) + taken)
+            if j >= 0:
+                store_entry(y, k, 4 * j, load_entry(y, k, 4 * j) + taken)
+                store_entry(y, k, 3 * i + j, load_entry(y, k, 3 * i + j) - taken)
+                store_entry(y, k, 3 * j + i, load_entry(y, k, 3 * j + i) - taken)
+        if demand != ALL:
+            across = load_entry(v, k, i)
+            if j >= 0:
+                across = across - load_entry(v, k, j)
+            current = (own - taken) * across
+            store_entry(y_j, k, i, load_entry(y_j, k, i) + current)
+            if j >= 0:
+                store_entry(y_j, k, j, load_entry(y_j, k, j) - current)
+
+
+@compiled
+def hang_units(
+    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, floor_pu: float
+) -> None:
+    """Every bank with its loads and machines on its node."""
+    units = tree.unit_node.size
+    if units == 0:
+        return
+    unit_y, v_pu = wide.unit_y, wide.winding_v_pu
+    for unit in range(units):
+        for i in range(6):
+            store_real(unit_y, (unit, i, 0), splat(0.0))
+    for n in range(tree.load_unit.size):
+        unit = tree.load_unit[n]
+        if unit >= 0:
+            for i in range(3):
+                seen = load_real(v_pu, (4 * unit + i, 0))
+                own = load_admittance(tree, state, n, s, seen, floor_pu)
+                store_entry(unit_y, unit, i, load_entry(unit_y, unit, i) + own)
+    apart = 0
+    for unit in range(units):
+        rare = ALL
+        if tree.unit_plain[unit]:
+            rare = hang_plain(tree, state, wide, unit, s)
+        apart |= rare
+    if apart:
+        for lane in range(WIDTH):
+            if apart >> lane & 1:
+                hang_apart(tree, state, wide, lane_of(lanes, lane), lane, s, floor_pu)
+
+
+@compiled
+def hang_plain(tree: Tree, state: State, wide: Wide, unit: int, s: int) -> int:
+    """A bank with nothing but loads; returns the lanes that have rarer connections."""
+    in_wye = in_delta = low_delta = 0
+    for lane in range(WIDTH):
+        connection = state.connection[unit, s + lane]
+        in_wye |= int(connection == YG_YG) << lane
+        in_delta |= int(connection == D_YG) << lane
+        low_delta |= int(connection == YG_D) << lane
+    zh, zl, y0 = tree.unit_zh_ohm[unit], tree.unit_zl_ohm[unit], tree.unit_y0_s[unit]
+    across = load_triple(wide.unit_y, unit)
+    if in_wye:
+        hang(tree, wide, unit, in_wye, wye_wye(zh, zl, y0, across))
+    if in_delta:
+        hang(tree, wide, unit, in_delta, delta_wye(zh + zl, across))
+    if low_delta:
+        hang(tree, wide, unit, low_delta, wye_delta(zh + zl, across))
+    return ALL & ~(in_wye | in_delta | low_delta)
+
+
+@compiled
+def hang(tree: Tree, wide: Wide, unit: int, bits: int, found: tuple[Matrix, Matrix]) -> None:
+    """Put a bank's shunt and windings in the lanes of ``bits``."""
+    mask, node = mask_of(bits), tree.unit_node[unit]
+    add_matrix(wide.y, node, chosen(mask, found[0], ZERO))
+    store_matrix(wide.g, unit, chosen(mask, found[1], load_matrix(wide.g, unit)))
+
+
+@compiled
+def hang_apart(
+    tree: Tree, state: State, wide: Wide, work: Work, lane: int, s: int, floor_pu: float
+) -> None:
+    """The banks of one scenario that have machines, magnetizing branches or rarer windings."""
+    plain, connections = tree.unit_plain, state.connection
+    unit_y, node = work.unit_y, tree.unit_node
+    for unit in range(plain.size):
+        if plain[unit] and connections[unit, s] <= YG_D:
+            continue
+        store(unit_y, unit, ZERO)
+        store_vector(work.unit_j, unit, (0j, 0j, 0j))
+        for i in range(3):
+            unit_y[unit, i, i] = complex(
+                wide.unit_y[unit, 2 * i, lane], wide.unit_y[unit, 2 * i + 1, lane]
+            )
+        for i in range(4):
+            work.winding_v_pu[4 * unit + i] = wide.winding_v_pu[4 * unit + i, lane]
+    for m in range(tree.machine_unit.size):
+        add_machine(tree, state, work, m, s, floor_pu)
+    for unit in range(plain.size):
+        if plain[unit] and connections[unit, s] <= YG_D:
+            continue
+        store(work.y, node[unit], ZERO)
+        store_vector(work.y_j, node[unit], (0j, 0j, 0j))
+        hang_bank(tree, work, unit, connections[unit, s])
+        add_lane(wide.y, node[unit], lane, work.y, node[unit])
+        add_lane_vector(wide.y_j, node[unit], lane, work.y_j, node[unit])
+        put_lane(wide.g, unit, lane, work.g, unit)
+        put_lane_vector(wide.g_j, unit, lane, work.g_j, unit)
+
+
+@compiled
+def set_region_shunts(
+    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, full: bool, floor_pu: float
+) -> None:
+    """What happens in each lane: shunts at the event node, and at a second step's node.
+
+    Nodes that a leap passes by get theirs in the lane's own scratch; all others in ``wide``, with
+    all that is eliminated anew.
+    """
+    for lane in range(WIDTH):
+        edge, far = state.edge[s + lane], state.far_node[s + lane]
+        if edge < 0 and far < 0:
+            continue
+        work = lane_of(lanes, lane)
+        empty_leap(tree, wide, work, edge)
+        empty_leap(tree, wide, work, far)
+        if far >= 0:
+            if tree.passed[far] < 0:
+                store(work.y, far, ZERO)
+            for i in range(3):
+                more, across = state.far_y_s[i, s + lane], state.far_between_y_s[i, s + lane]
+                add_shunt(work.y, far, i, more, across)
+            if full and tree.passed[far] < 0:
+                add_lane(wide.y, far, lane, work.y, far)
+        if edge < 0:
+            continue
+        upper = tree.parent[edge]
+        for node in (upper, edge):
+            if tree.passed[node] < 0:
+                store(work.y, node, ZERO)
+        at = 4 * tree.unit_node.size
+        for i in range(3):
+            work.winding_v_pu[at + i] = wide.winding_v_pu[at + i, lane]
+        set_event_shunts(tree, state, work, s + lane, floor_pu)
+        if full and tree.charged:
+            for node in (upper, edge):
+                if tree.passed[node] < 0:
+                    add_lane(wide.y, node, lane, work.y, node)
+
+
+@compiled
+def empty_leap(tree: Tree, wide: Wide, work: Work, node: int) -> None:
+    """The fixed shunts on the nodes of the leap that ``node`` is part of."""
+    q = leap_at(tree, node)
+    if q < 0:
+        return
+    for n in range(tree.region_from[q], tree.region_from[q + 1]):
+        k = tree.region_node[n]
+        if tree.passed[k] >= 0:
+            store(work.y, k, load(tree.shunt_s, k))
+            store_vector(work.y_j, k, (0j, 0j, 0j))
+
+
+@compiled
+def leap_at(tree: Tree, node: int) -> int:
+    """The leap that passes a node by, or else ends there; -1: none."""
+    if node < 0:
+        return -1
+    return max(tree.passed[node], tree.leap[node])

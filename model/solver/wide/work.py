@@ -1,0 +1,143 @@
+"""Scratch space for eight scenarios: in lanes what all share, and a record of each for itself."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import compiled
+from ...lanes import WIDTH
+from ...states import Tree, Work, workspace
+from .rows import Stack
+
+__all__ = ["ALL", "LEAP", "PASSED", "PLAIN", "TWIG", "Wide", "lane_of", "wide_workspace"]
+
+Int = NDArray[np.int64]
+
+ALL = (1 << WIDTH) - 1  #: bits of all lanes
+PASSED, PLAIN, LEAP, TWIG = 0, 1, 2, 3  #: how the ladder takes a node
+
+ALIGNED = 64  #: bytes: a vector that begins elsewhere takes two lines of the cache
+
+
+class Wide(NamedTuple):
+    """Scratch of eight scenarios in a network of B nodes, U units, P branches, Q leaps.
+
+    What each means stands at the field of that name in ``Work``. ``visit`` says whether a node is
+    passed by, and ``leap`` which leap ends there or, for a twig, begins; a region is what the
+    ladder takes apart for a scenario by itself: an edge on which something happens with the
+    whole leap that it is part of, or one that leaves modes loose.
+    """
+
+    visit: Int  #: (B,)
+    leap: Int  #: (B,) -1: none
+    above: Int  #: (B,) the node above that is not passed by; B, the EMF's row, for node 0
+    place: Int  #: (Q,) the node at which a leap is visited
+    loose: NDArray[np.bool_]  #: (B,) every lane is by itself there
+    busy: Int  #: (B,) bits of the lanes in which something happens in the region there
+    flags: Int  #: (WIDTH,)
+    y: Stack  #: (B, 18, WIDTH)
+    f: Stack  #: (B, 18, WIDTH)
+    w: Stack  #: (B, 18, WIDTH)
+    y_j: Stack  #: (B, 6, WIDTH)
+    h_j: Stack  #: (B, 6, WIDTH)
+    x_j: Stack  #: (B, 6, WIDTH)
+    v: Stack  #: (B + 1, 6, WIDTH)
+    turn: Stack  #: (1, 18, WIDTH) T of a regulator
+    current: Stack  #: (1, 6, WIDTH) at a probe
+    g: Stack  #: (U, 18, WIDTH)
+    g_j: Stack  #: (U, 6, WIDTH)
+    unit_y: Stack  #: (U, 6, WIDTH) loads across the LV windings
+    branch_y: Stack  #: (P, 2, WIDTH) as last eliminated
+    branch_own: Stack  #: (P, 2, WIDTH) as the voltages have it
+    winding_v_pu: NDArray[np.float64]  #: (N, WIDTH)
+    history: NDArray[np.float64]  #: (3, N, WIDTH)
+
+
+def wide_workspace(tree: Tree) -> tuple[Wide, Work]:
+    """Scratch in lanes, and that of ``workspace`` with an axis of lanes before all others."""
+    nodes, units, branches = tree.parent.size, tree.unit_node.size, tree.branch_node.size
+    windings = 4 * (units + 1) + branches
+    visit, leap = np.full(nodes, PLAIN), np.full(nodes, -1)
+    above, place = tree.parent.copy(), np.zeros(tree.leap_from.size, np.int64)
+    above[0] = nodes
+    visit[tree.passed >= 0] = PASSED
+    for q in range(tree.leap_from.size):
+        region = tree.region_node[tree.region_from[q] : tree.region_from[q + 1]]
+        k = region.min() if q < tree.twigs else np.flatnonzero(tree.leap == q)[0]
+        visit[k] = TWIG if q < tree.twigs else LEAP
+        leap[k], above[k], place[q] = q, tree.leap_from[q], k
+    one = workspace(tree)
+    return Wide(
+        visit=visit,
+        leap=leap,
+        above=above,
+        place=place,
+        loose=np.diff(tree.loose_from) > 0,
+        busy=np.zeros(nodes, np.int64),
+        flags=np.zeros(WIDTH, np.int64),
+        y=_aligned(nodes, 18),
+        f=_aligned(nodes, 18),
+        w=_aligned(nodes, 18),
+        y_j=_aligned(nodes, 6),
+        h_j=_aligned(nodes, 6),
+        x_j=_aligned(nodes, 6),
+        v=_aligned(nodes + 1, 6),
+        turn=_aligned(1, 18),
+        current=_aligned(1, 6),
+        g=_aligned(units, 18),
+        g_j=_aligned(units, 6),
+        unit_y=_aligned(units, 6),
+        branch_y=_aligned(branches, 2),
+        branch_own=_aligned(branches, 2),
+        winding_v_pu=_aligned(windings),
+        history=_aligned(3, windings),
+    ), Work._make(np.zeros((WIDTH, *part.shape), part.dtype) for part in one)
+
+
+def _aligned(*shape: int) -> NDArray[np.float64]:
+    """Zeros (..., WIDTH) that begin where a line of the cache does."""
+    size = int(np.prod(shape)) * WIDTH
+    room = np.zeros(size + ALIGNED // 8)
+    first = -room.ctypes.data // 8 % (ALIGNED // 8)
+    return room[first : first + size].reshape(*shape, WIDTH)
+
+
+@compiled
+def lane_of(lanes: Work, lane: int) -> Work:
+    """One scenario's own scratch."""
+    return Work(
+        lanes.y[lane],
+        lanes.f[lane],
+        lanes.h[lane],
+        lanes.h_j[lane],
+        lanes.w[lane],
+        lanes.x[lane],
+        lanes.x_j[lane],
+        lanes.x_low[lane],
+        lanes.y_j[lane],
+        lanes.v[lane],
+        lanes.g[lane],
+        lanes.g_j[lane],
+        lanes.branch_y[lane],
+        lanes.unit_y[lane],
+        lanes.unit_j[lane],
+        lanes.event_y[lane],
+        lanes.xt[lane],
+        lanes.u[lane],
+        lanes.u_j[lane],
+        lanes.chord[lane],
+        lanes.here[lane],
+        lanes.here_j[lane],
+        lanes.here_x[lane],
+        lanes.here_h[lane],
+        lanes.row[lane],
+        lanes.event[lane],
+        lanes.event_h[lane],
+        lanes.event_j[lane],
+        lanes.stub[lane],
+        lanes.winding_v_pu[lane],
+        lanes.history[lane],
+    )
