@@ -12,11 +12,17 @@ from ..states import State, Tree, Work
 from .assemble import load_admittance
 from .breaks import squared
 from .event_node import climb_event, climb_loose
-from .matrix3 import add, load, load_vector, minus, plus, store_vector, times
+from .matrix3 import Vector, load, load_vector, minus, plus, store_vector, times
 from .series import up
 from .turns import transposed, turn_edge, turn_of
 
-__all__ = ["can_correct", "climb_corrections", "leaps_to_take_apart", "set_corrections"]
+__all__ = [
+    "can_correct",
+    "climb_corrections",
+    "leap_current",
+    "leaps_to_take_apart",
+    "set_corrections",
+]
 
 NEAR = 0.2  #: an admittance farther from the eliminated one than this share needs a new elimination
 
@@ -68,6 +74,15 @@ def leaps_to_take_apart(tree: Tree, edge: int, far_node: int) -> tuple[int, int]
 
 
 @compiled
+def leap_current(tree: Tree, work: Work, k: int, leap: int) -> Vector:
+    """What is drawn above the leap that ends at node k, by no voltage; H past it."""
+    chain, drawn = tree.leap_chain[leap], load_vector(work.y_j, k)
+    lost = times(load(chain, 1), drawn)
+    store_vector(work.h_j, k, minus(times(load(work.f, k), lost)))
+    return plus(times(load(chain, 3), drawn), minus(times(load(work.w, k), lost)))
+
+
+@compiled
 def carry_correction(tree: Tree, state: State, work: Work, k: int, s: int) -> None:
     """Past an edge on which nothing happens."""
     y, z, drawn = load(work.y, k), load(tree.z_ohm, k), load_vector(work.y_j, k)
@@ -103,19 +118,22 @@ def climb_corrections(tree: Tree, state: State, work: Work, s: int) -> None:
         if leaping:
             parent = tree.leap_from[leap]
         if a >= 0 and k != edge:
-            z1 = tree.leap_z_ohm[leap, a, a] if leaping else z_all[k, a, a]
             drawn1 = y_j[k, a]
-            h_j[k, a] = -f_all[k, a, a] * z1 * drawn1
-            drawn1 *= f_all[k, a, a]
+            if leaping:
+                chain = tree.leap_chain[leap]
+                h_j[k, a] = -f_all[k, a, a] * chain[1, a, a] * drawn1
+                drawn1 *= chain[3, a, a]
+                w1 = chain[2, a, a] + chain[3, a, a] * y_all[k, a, a]
+                drawn1 += w1 * h_j[k, a]
+            else:
+                h_j[k, a] = -f_all[k, a, a] * z_all[k, a, a] * drawn1
+                drawn1 *= f_all[k, a, a]
             x_j[k, a] = drawn1
             y_j[parent, a] += drawn1
             continue
         drawn = load_vector(y_j, k)
         if leaping:
-            y = add(load(y_all, k), load(tree.leap_low_s, leap))
-            ahead = minus(times(load(f_all, k), times(load(tree.leap_z_ohm, leap), drawn)))
-            store_vector(h_j, k, ahead)
-            store_vector(x_j, k, plus(drawn, times(y, ahead)))
+            store_vector(x_j, k, leap_current(tree, work, k, leap))
         elif k == edge:
             share, mask = state.share[s], state.open_mask[s]
             climb_event(tree, work, k, load(z_all, k), share, mask, tree.carried[k], drawn)

@@ -40,6 +40,7 @@ from .breaks import FLOATING, NOTHING_S, SINGULAR, squared
 from .corrections import (
     can_correct,
     climb_corrections,
+    leap_current,
     leaps_to_take_apart,
     set_corrections,
 )
@@ -49,10 +50,12 @@ from .matrix3 import (
     Vector,
     add,
     column_sums,
+    inverse,
     load,
     load_vector,
     minus,
     plus,
+    product,
     reciprocal,
     scaled,
     store,
@@ -84,7 +87,7 @@ def climb(tree: Tree, state: State, work: Work, s: int) -> int:
     for q in range(tree.twigs):
         if q != needed and q != needed_too:
             k = tree.leap_from[q]
-            store(y_all, k, add(load(y_all, k), load(tree.leap_up_s, q)))
+            store(y_all, k, add(load(y_all, k), load(tree.leap_chain[q], 2)))
     for k in range(parents.size - 1, -1, -1):
         leap = passed[k]
         if leap >= 0 and leap != needed and leap != needed_too:
@@ -153,22 +156,22 @@ def is_sourced(tree: Tree) -> bool:
 @compiled
 def climb_leap(tree: Tree, work: Work, k: int, leap: int) -> None:
     """Eliminate all the edges of a leap at once, at whose end node k is."""
-    a, above = tree.lone_phase[k], tree.leap_from[leap]
-    y_all, up_s, low_s = work.y, tree.leap_up_s, tree.leap_low_s
+    a, above, chain = tree.lone_phase[k], tree.leap_from[leap], tree.leap_chain[leap]
+    y_all = work.y
     if a >= 0:
-        y1 = y_all[k, a, a] + low_s[leap, a, a]
-        f1 = reciprocal(1.0 + tree.leap_z_ohm[leap, a, a] * y1)
+        y1 = y_all[k, a, a]
+        f1 = reciprocal(chain[0, a, a] + chain[1, a, a] * y1)
         work.f[k, a, a] = f1
-        y_all[above, a, a] += y1 * f1 + up_s[leap, a, a]
+        y_all[above, a, a] += (chain[2, a, a] + chain[3, a, a] * y1) * f1
         return
-    y, z = add(load(y_all, k), load(low_s, leap)), load(tree.leap_z_ohm, leap)
-    f, w = up(y, z)
+    y = load(y_all, k)
+    f = inverse(add(load(chain, 0), product(load(chain, 1), y)))
+    w = product(add(load(chain, 2), product(load(chain, 3), y)), f)
     store(work.f, k, f)
-    store(y_all, above, add(load(y_all, above), add(w, load(up_s, leap))))
+    store(work.w, k, w)
+    store(y_all, above, add(load(y_all, above), w))
     if is_sourced(tree):
-        none = tree.carried[k]
-        ahead, drawn = carry_current(y, z, f, load_vector(work.y_j, k), work, none)
-        store_vector(work.h_j, k, ahead)
+        drawn = leap_current(tree, work, k, leap)
         store_vector(work.y_j, above, plus(load_vector(work.y_j, above), drawn))
 
 
