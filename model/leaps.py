@@ -1,14 +1,13 @@
-"""Buses that nothing hangs on, passed by in one leap: exactly, and only while nobody looks.
+"""Buses that nothing varies on, passed by in one leap: exactly, and only while nobody looks.
 
-A chain of lines through such buses is one line with an impedance of its own and a shunt at
-either end, as long as its lines are built alike; a twig, behind which nothing hangs at all, is a
-shunt. An event there needs the buses, and gets them back for that scenario.
+A chain of plain edges is four matrices between its two ends, whatever its lines are built like
+and whatever constant shunts its buses have: capacitors, charging, twigs behind which nothing
+hangs. An event there needs the buses, and gets them back for that scenario.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +18,18 @@ from .states import Probes, Tree
 __all__ = ["with_leaps"]
 
 Complex = NDArray[np.complex128]
+Int = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
-SYMMETRIC = 1e-9  #: a chain more asymmetric than this stays as it is: it would cost 1e-11 pu
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Chain:
+    """Plain edges in a row."""
+
+    end: int  #: the node below them
+    above: int  #: the node above them
+    inner: list[int]  #: nodes between, upwards
+    matrices: Complex  #: (4, 3, 3) A, B, C, D
 
 
 def with_leaps(network: Network, probes: Probes) -> Network:
@@ -29,134 +38,145 @@ def with_leaps(network: Network, probes: Probes) -> Network:
     What is seen agrees with the network as it was to rounding.
     """
     tree = network.tree
-    bare = _bare(tree, probes)
-    fields: dict[str, Any] = {name: getattr(tree, name).copy() for name in ("passed", "leap")}
-    twigs, up = _twigs(tree, bare)
-    above: list[int] = []
-    for k, root in twigs.items():
-        if k == root:
-            above.append(int(tree.parent[k]))
-        fields["passed"][k] = list(up).index(root)
-    up_all = list(up.values())
-    count = len(above)
-    z = [np.zeros((3, 3), np.complex128)] * count
-    low = list(z)
-    open_to = _passable(tree, bare)
-    for k in range(1, tree.parent.size):
-        if open_to[k] or k in twigs or not open_to[tree.parent[k]] or _seen(k, probes):
-            continue
-        inner, made = _chain(tree, k, open_to, probes)
-        if inner:
-            fields["passed"][inner] = len(above)
-            fields["leap"][k] = len(above)
-            above.append(tree.parent[inner[-1]])
-            z.append(made[0])
-            up_all.append(made[1])
-            low.append(made[2])
-    fields["leap_from"] = np.array(above, np.int64)
-    fields["twigs"] = count
-    for name, of in (("leap_z_ohm", z), ("leap_up_s", up_all), ("leap_low_s", low)):
-        fields[name] = np.array(of, np.complex128).reshape(-1, 3, 3)
-    return replace(network, tree=tree._replace(**fields))
+    plain = _plain(tree, probes)
+    bare = plain & ~_busy(tree, probes)
+    dry, hung_s = _dry(tree, bare)
+    passable = _passable(tree, plain, bare, dry)
+    roots = _roots(tree, dry, passable)
+    chains = _chains(tree, dry, passable, hung_s)
+    twigs = [_twig(tree, k, hung_s[k]) for k in roots]
+    passed, leap = _numbers(tree, dry, roots, chains)
+    region_from, region_node = _regions(passed, leap, len(roots) + len(chains))
+    above = [*tree.parent[roots], *(chain.above for chain in chains)]
+    matrices = [*twigs, *(chain.matrices for chain in chains)]
+    leaping = tree._replace(
+        passed=passed,
+        leap=leap,
+        twigs=len(roots),
+        leap_from=np.array(above, np.int64),
+        leap_chain=np.array(matrices, np.complex128).reshape(-1, 4, 3, 3),
+        region_from=region_from,
+        region_node=region_node,
+        lone_phase=_lone_phases(tree, chains),
+    )
+    return replace(network, tree=leaping)
 
 
-def _seen(edge: int, probes: Probes) -> bool:
-    return bool((probes.i_edge == edge).any())
+def _plain(tree: Tree, probes: Probes) -> Flags:
+    """(B,) edges that are a constant impedance and nothing else, at which nobody looks.
 
-
-def _bare(tree: Tree, probes: Probes) -> NDArray[np.bool_]:
-    """(B,) nodes below a plain edge, with nothing on them but charging, that nobody looks at."""
+    Above a regulator the voltages are what its taps make of those below; loose modes depend on
+    all that hangs below them; a loop leads elsewhere.
+    """
     count = tree.parent.size
-    bare = (tree.regulator[:count] < 0) & (tree.transformer[:count] < 0)
-    bare &= ~tree.in_loop & (np.diff(tree.loose_from) == 0) & ~_capacitors(tree)
-    seen = probes.i_edge[probes.i_edge < count]
-    for busy in (tree.unit_node, tree.branch_node, tree.fork, tree.tail, probes.v_node, seen):
-        bare[busy] = False
-    bare[0] = False
-    return np.asarray(bare)
+    plain = (tree.regulator[:count] < 0) & (tree.transformer[:count] < 0)
+    plain &= ~tree.in_loop & (np.diff(tree.loose_from) == 0)
+    plain[0] = False
+    plain[probes.i_edge[probes.i_edge < count]] = False
+    return np.asarray(plain)
 
 
-def _twigs(tree: Tree, bare: NDArray[np.bool_]) -> tuple[dict[int, int], dict[int, Complex]]:
-    """The root of the twig that each of its nodes belongs to, and each root's admittance."""
-    count = tree.parent.size
-    dry, y = bare.copy(), tree.shunt_s.copy()
-    for k in range(count - 1, 0, -1):
+def _busy(tree: Tree, probes: Probes) -> Flags:
+    """(B,) nodes that somebody looks at, or with more on them than constant shunts."""
+    busy = np.zeros(tree.parent.size, np.bool_)
+    for nodes in (tree.unit_node, tree.branch_node, tree.fork, tree.tail, probes.v_node):
+        busy[nodes] = True
+    return busy
+
+
+def _dry(tree: Tree, bare: Flags) -> tuple[Flags, Complex]:
+    """(B,) the nodes of twigs; (B, 3, 3) each node's shunt with the twigs that hang on it."""
+    dry, hung_s = bare.copy(), tree.shunt_s.copy()
+    for k in range(dry.size - 1, 0, -1):
         parent = tree.parent[k]
         if dry[k]:
-            y[k] = y[k] @ np.linalg.inv(np.eye(3) + tree.z_ohm[k] @ y[k])
-            y[parent] += y[k]
+            hung_s[parent] += _seen_from_above(tree.z_ohm[k], hung_s[k])
         else:
             dry[parent] = False
-    root: dict[int, int] = {}
-    for k in range(1, count):
-        if dry[k]:
-            root[k] = root.get(int(tree.parent[k]), k)
-    return root, {k: y[k] for k in root if root[k] == k}
+    return dry, hung_s
 
 
-def _passable(tree: Tree, bare: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(B,) bare nodes between two plain edges."""
-    count = tree.parent.size
-    passable = bare & (np.bincount(tree.parent[1:], minlength=count) == 1)
-    for k in range(1, count):
-        turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
-        if turned or tree.loose_from[k + 1] > tree.loose_from[k] or tree.in_loop[k]:
-            passable[tree.parent[k]] = False
+def _seen_from_above(z_ohm: Complex, y_s: Complex) -> Complex:
+    """``y_s`` behind a series impedance."""
+    return np.asarray(y_s @ np.linalg.inv(np.eye(3) + z_ohm @ y_s))
+
+
+def _passable(tree: Tree, plain: Flags, bare: Flags, dry: Flags) -> Flags:
+    """(B,) bare nodes between two plain edges, besides which there are only twigs."""
+    lower = np.flatnonzero(~dry)
+    lower = lower[lower > 0]
+    wet = np.bincount(tree.parent[lower], minlength=dry.size)
+    passable = bare & (wet == 1)
+    passable[tree.parent[lower[~plain[lower]]]] = False
     return np.asarray(passable)
 
 
-def _capacitors(tree: Tree) -> NDArray[np.bool_]:
-    """(B,) nodes with more of a shunt than their edges' charging."""
-    charging = np.zeros_like(tree.shunt_s)
-    count = tree.parent.size
-    np.add.at(charging, tree.parent[1:], tree.end_y_s[1:count])
-    charging[1:] += tree.end_y_s[1:count]
-    for c in range(tree.tail.size):
-        for node in (tree.tail[c], tree.fork[c]):
-            charging[node] += tree.end_y_s[count + c]
-    scale = np.abs(charging).max(axis=(1, 2))
-    return np.asarray(np.abs(tree.shunt_s - charging).max(axis=(1, 2)) > 1e-12 * scale)
+def _roots(tree: Tree, dry: Flags, passable: Flags) -> Int:
+    """The first node of every twig that hangs on a node which stays."""
+    above = tree.parent
+    return np.flatnonzero(dry & ~dry[above] & ~passable[above])
 
 
-def _chain(
-    tree: Tree, k: int, passable: NDArray[np.bool_], probes: Probes
-) -> tuple[list[int], tuple[Complex, Complex, Complex]]:
-    """Nodes passed by above node k, nearest first, and the chain's Z and end shunts."""
-    nothing = np.zeros((3, 3), np.complex128)
-    inner: list[int] = []
-    made = (tree.z_ohm[k], nothing, nothing)
-    node = int(tree.parent[k])
-    while passable[node] and tree.phases[node] == tree.phases[k] and not _seen(node, probes):
-        joined = _joined(tree.z_ohm[node], tree.shunt_s[node], made)
-        if joined is None:
-            break
-        inner.append(node)
-        made = joined
-        node = int(tree.parent[node])
-    return inner, made
+def _twig(tree: Tree, root: int, hung_s: Complex) -> Complex:
+    """(4, 3, 3) of a twig, into which no current goes but its own."""
+    one, none = np.eye(3), np.zeros((3, 3))
+    return np.array([one, none, _seen_from_above(tree.z_ohm[root], hung_s), one])
 
 
-def _joined(
-    z_above: Complex, shunt: Complex, below: tuple[Complex, Complex, Complex]
-) -> tuple[Complex, Complex, Complex] | None:
-    """One line of two with ``shunt`` between them; None where no line is like that.
+def _chains(tree: Tree, dry: Flags, passable: Flags, hung_s: Complex) -> list[_Chain]:
+    """Every chain, by its end node; each passable node is in one."""
+    ends = np.flatnonzero(~dry & ~passable)
+    return [_chain(tree, int(k), passable, hung_s) for k in ends if k and passable[tree.parent[k]]]
 
-    With Y that shunt and the upper one of the line below, V_above = A V + B I has
-    B = Z1 + Z2 + Z1 Y Z2, which must be symmetric to be an impedance; the shunts are then
-    B^-1 Z2 Y above, and B^-1 Z1 Y more than it had below.
+
+def _chain(tree: Tree, end: int, passable: Flags, hung_s: Complex) -> _Chain:
+    """Climb from ``end`` to the first node that stays.
+
+    From  V_up = A V + B I,  I_up = C V + D I  just below a node with the shunt Y, under an edge
+    of the impedance Z, to the upper end of that edge:
+
+        C += Y A,  D += Y B,  A += Z C,  B += Z D.
+
+    Where an edge lacks a phase its Z is zero, no current flows and the voltage is carried on.
     """
-    z, up, low = below
-    there = np.flatnonzero((np.abs(z_above) + np.abs(z)).max(axis=1) > 0.0)
-    y = shunt + up
-    if not there.size:
-        return z, np.zeros((3, 3), np.complex128), low + y
-    pick = np.ix_(there, there)
-    z1, z2, between = z_above[pick], z[pick], y[pick]
-    b = z1 + z2 + z1 @ between @ z2
-    if np.abs(b - b.T).max() > SYMMETRIC * np.abs(b).max():
-        return None
-    series, above, under = (np.zeros((3, 3), np.complex128) for _ in range(3))
-    series[pick] = b
-    above[pick] = np.linalg.solve(b, z2 @ between)
-    under[pick] = low[pick] + np.linalg.solve(b, z1 @ between)
-    return series, above, under
+    one = np.eye(3, dtype=np.complex128)
+    a, b, c, d = one, tree.z_ohm[end], np.zeros_like(one), one
+    inner: list[int] = []
+    node = int(tree.parent[end])
+    while passable[node]:
+        inner.append(node)
+        c, d = c + hung_s[node] @ a, d + hung_s[node] @ b
+        a, b = a + tree.z_ohm[node] @ c, b + tree.z_ohm[node] @ d
+        node = int(tree.parent[node])
+    return _Chain(end=end, above=node, inner=inner, matrices=np.array([a, b, c, d]))
+
+
+def _numbers(tree: Tree, dry: Flags, roots: Int, chains: list[_Chain]) -> tuple[Int, Int]:
+    """(B,) the leap that passes each node by, and the leap that ends there; -1: none."""
+    passed, leap = np.full((2, dry.size), -1, np.int64)
+    passed[roots] = np.arange(roots.size)
+    for q, chain in enumerate(chains, roots.size):
+        passed[chain.inner] = q
+        leap[chain.end] = q
+    for k in np.flatnonzero(dry):  # parents first
+        if passed[k] < 0:
+            passed[k] = passed[tree.parent[k]]
+    return passed, leap
+
+
+def _regions(passed: Int, leap: Int, leaps: int) -> tuple[Int, Int]:
+    """Where each leap's nodes start, and the nodes: what it passes by and its end."""
+    of = np.maximum(passed, leap)
+    nodes = np.flatnonzero(of >= 0)[::-1]
+    region_node = nodes[np.argsort(of[nodes], kind="stable")]
+    sizes = np.bincount(of[nodes], minlength=leaps)
+    return np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)]), region_node
+
+
+def _lone_phases(tree: Tree, chains: list[_Chain]) -> Int:
+    """(B,) ``Tree.lone_phase``, -1 at the end of a chain that has more phases further up."""
+    lone = tree.lone_phase.copy()
+    for chain in chains:
+        if np.any(tree.phases[chain.inner] != tree.phases[chain.end]):
+            lone[chain.end] = -1
+    return lone
