@@ -347,7 +347,6 @@ def store_real(typing: Any, array: Any, where: Any, value: Any) -> Any:
 @intrinsic  # type: ignore[untyped-decorator]
 def select(typing: Any, mask: Any, one: Any, other: Any) -> Any:
     """``one`` in the lanes of ``mask``, ``other`` elsewhere."""
-
     kinds = [_own(one), _own(other)]
     plain = all(kind in (REAL, types.float64) for kind in kinds)
 
@@ -385,7 +384,9 @@ def smaller(typing: Any, one: Any, other: Any) -> Any:
 
 def _by_name(name: str) -> Callable[..., Any]:
     def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.call(builder.module.declare_intrinsic(name, [_VECTOR]), args)
+        kind = ir.FunctionType(_VECTOR, [_VECTOR])
+        full = f"{name}.v{WIDTH}f64"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, full), args)
 
     return code
 

@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .lanes import WIDTH
 from .machine_state import FLOOR_PU, machine_state
 from .network import Network
 from .solver.ladder import solve_block
+from .solver.wide.solve import solve_wide
+from .solver.wide.work import wide_workspace
 from .states import Answer, Probes, State, workspace
 
 __all__ = ["FLOOR_PU", "all_probes", "new_answer", "quiet_state", "solve", "steady_state"]
@@ -124,11 +127,33 @@ def solve(
     probes = probes or all_probes(network)
     if np.any(network.tree.passed[probes.v_node] >= 0):
         raise ValueError("probes look at a node that a leap passes by")
+    scenarios, tree = state.emf_pu.size, network.tree
+    limits = tolerance_pu, MOST_PASSES, FLOOR_PU
+    if tree.tail.size:
+        answer = new_answer(network, probes, scenarios)
+        answer.winding_v_pu[:] = 1.0 if start is None else start
+        solve_block(tree, state, probes, workspace(tree), answer, *limits)
+        return answer
+    state = State._make(map(_in_lanes, state))
     answer = new_answer(network, probes, state.emf_pu.size)
-    work = workspace(network.tree)
-    answer.winding_v_pu[:] = 1.0 if start is None else start
-    solve_block(network.tree, state, probes, work, answer, tolerance_pu, MOST_PASSES, FLOOR_PU)
+    answer.winding_v_pu[:] = 1.0 if start is None else _in_lanes(start)
+    solve_wide(tree, state, probes, *wide_workspace(tree), answer, *limits)
+    if answer.flags.size > scenarios:
+        answer = Answer._make(np.ascontiguousarray(part[..., :scenarios]) for part in answer)
     return answer
+
+
+def _in_lanes(values: NDArray[Any]) -> NDArray[Any]:
+    """Contiguous, the last scenario repeated until they fill their lanes."""
+    missing = -values.shape[-1] % WIDTH
+    if missing:
+        widths = [(0, 0)] * (values.ndim - 1) + [(0, missing)]
+        values = (
+            np.pad(values, widths, mode="edge")
+            if values.size
+            else np.zeros((*values.shape[:-1], values.shape[-1] + missing), values.dtype)
+        )
+    return np.ascontiguousarray(values)
 
 
 def _check(network: Network, state: State) -> None:

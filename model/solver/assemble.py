@@ -177,9 +177,7 @@ def add_machine(tree: Tree, state: State, work: Work, m: int, s: int, floor_pu: 
     behind = (y0 + turn.conjugate() * y1 + turn * y2) / 3.0
     add_circulant(unit_y, unit, own, ahead, behind)
     j = state.machine_j_a[m, s]
-    store_vector(
-        unit_j, unit, plus(load_vector(unit_j, unit), (j, j * turn.conjugate(), j * turn))
-    )
+    store_vector(unit_j, unit, plus(load_vector(unit_j, unit), (j, j * turn.conjugate(), j * turn)))
 
 
 @compiled

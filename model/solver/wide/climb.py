@@ -14,7 +14,6 @@ from ..matrix3 import (
     add,
     inverse,
     load,
-    load_vector,
     minus,
     plus,
     plus_diagonal,

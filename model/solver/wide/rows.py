@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ...lanes import WIDTH, joined, load_real, select, store_real
+from ...lanes import joined, load_real, select, store_real
 from ..matrix3 import Matrix, Vector
 
 __all__ = [
@@ -171,6 +171,3 @@ def add_lane_vector(stack: Stack, k: int, lane: int, given: Complex, n: int) -> 
     for i in range(3):
         stack[k, 2 * i, lane] += given[n, i].real
         stack[k, 2 * i + 1, lane] += given[n, i].imag
-
-
-

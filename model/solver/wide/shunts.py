@@ -58,7 +58,13 @@ def size2(value: complex) -> float:
 
 @compiled
 def set_shunts(
-    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, how: tuple[int, bool, bool], floor_pu: float
+    tree: Tree,
+    state: State,
+    wide: Wide,
+    lanes: Work,
+    s: int,
+    how: tuple[int, bool, bool],
+    floor_pu: float,
 ) -> None:
     """Everything on the nodes but what happens in regions.
 
@@ -101,9 +107,7 @@ def set_shunts(
 
 
 @compiled
-def hang_units(
-    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, floor_pu: float
-) -> None:
+def hang_units(tree: Tree, state: State, wide: Wide, lanes: Work, s: int, floor_pu: float) -> None:
     """Every bank with its loads and machines on its node."""
     units = tree.unit_node.size
     if units == 0:
