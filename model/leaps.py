@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .network import Network
 from .states import Probes, Tree
 
-__all__ = ["with_leaps"]
+__all__ = ["why_solved", "with_leaps"]
 
 Complex = NDArray[np.complex128]
 Int = NDArray[np.int64]
@@ -180,3 +180,35 @@ def _lone_phases(tree: Tree, chains: list[_Chain]) -> Int:
         if np.any(tree.phases[chain.inner] != tree.phases[chain.end]):
             lone[chain.end] = -1
     return lone
+
+
+def why_solved(network: Network, probes: Probes) -> dict[str, int]:
+    """How many nodes no leap of ``network`` passes by, by the first reason that holds for each.
+
+    ``loads``: loads, machines or transformers hang there; ``points``: a probe looks there;
+    ``forks``: the network forks there; ``others``: the source, loops, and either side of
+    regulators, in-line transformers and edges that do not bring all phases.
+    """
+    tree = network.tree
+    count = tree.parent.size
+    kept = np.flatnonzero(tree.passed < 0)
+    above = np.where(tree.leap >= 0, np.append(tree.leap_from, -1)[tree.leap], tree.parent)
+    ways_down = np.bincount(above[kept[kept > 0]], minlength=count)
+    tree_edges = probes.i_edge[(probes.i_edge > 0) & (probes.i_edge < count)]
+    chords = probes.i_edge[probes.i_edge >= count] - count
+    reasons = {
+        "loads": (tree.unit_node, tree.branch_node),
+        "points": (
+            *(probes.v_node, tree_edges, tree.parent[tree_edges]),
+            *(tree.tail[chords], tree.fork[chords]),
+        ),
+        "forks": (np.flatnonzero(ways_down > 1),),
+        "others": (np.arange(count),),
+    }
+    left = tree.passed < 0
+    found: dict[str, int] = {}
+    for reason, places in reasons.items():
+        here = np.unique(np.concatenate(places))
+        found[reason] = int(left[here].sum())
+        left[here] = False
+    return found

@@ -15,7 +15,7 @@ from ..model.importers.dss_feeder import Imported, import_opendss
 from ..model.importers.fidelity import Difference, differences
 from ..model.importers.report import fidelity_report
 from ..model.importers.report_text import report_markdown, report_text
-from ..model.leaps import with_leaps
+from ..model.leaps import why_solved, with_leaps
 from ..model.network import compile_network
 from ..model.parts import Feeder
 from ..model.points import find_points, point_probes
@@ -146,15 +146,19 @@ def _fold(work: _Work) -> None:
 
 
 def _count_buses(work: _Work) -> None:
-    """Say how many buses the solver passes by, since nothing hangs on them."""
+    """Say how many buses the solver passes by, and why not the others."""
     network = compile_network(work.feeder)
     probes = point_probes(find_points(work.feeder, network))
-    kept = int((with_leaps(network, probes).tree.passed < 0).sum())
+    why = why_solved(with_leaps(network, probes), probes)
+    kept, count = sum(why.values()), len(network.nodes)
     work.lines += [
         "",
-        f"{kept} of {len(network.nodes)} buses are solved; the rest is merged, exactly",
+        f"{kept} of {count} buses are solved in every scenario: {why['loads']} with loads or "
+        f"machines, {why['points']} that points look at, {why['forks']} forks, {why['others']} at "
+        f"the source, regulators, in-line transformers or in loops; the other {count - kept} are "
+        "passed by, exactly, until an event happens there",
     ]
-    work.parts["merged"] = {"buses": len(network.nodes), "kept": kept}
+    work.parts["merged"] = {"buses": count, "kept": kept, "why": why}
 
 
 def _write(work: _Work, args: argparse.Namespace, imported: Imported) -> list[Path]:

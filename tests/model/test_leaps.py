@@ -12,11 +12,12 @@ from oracles.random_mixed import random_mixed_feeder
 
 from openphase.model.errors import InputError
 from openphase.model.events.base import apply_event
-from openphase.model.leaps import with_leaps
+from openphase.model.leaps import why_solved, with_leaps
 from openphase.model.machine_state import carried_over
 from openphase.model.network import Network, compile_network
 from openphase.model.parts import Capacitor, Feeder, Line, LineCode, Place
 from openphase.model.phases import letters
+from openphase.model.reading.feeder_file import load_feeder
 from openphase.model.solve import solve, steady_state
 from openphase.model.states import NOT_CONVERGED, Answer, Probes, State, Tree
 
@@ -312,3 +313,21 @@ def test_every_edge_at_a_passed_node_belongs_to_its_leap():
             assert set(region.tolist()) == set(np.flatnonzero(leap_of == q).tolist())
             assert tree.passed[tree.leap_from[q]] < 0
             assert (np.diff(region) < 0).all()
+
+
+def test_ieee_123_keeps_what_its_loads_and_forks_need():
+    network = compile_network(load_feeder("ieee123"))
+    leaping = with_leaps(network, nobody())
+    why = why_solved(leaping, nobody())
+    assert why == {"loads": 85, "points": 0, "forks": 26, "others": 8}
+    assert sum(why.values()) == int((leaping.tree.passed < 0).sum())
+    assert len(network.nodes) == 132
+
+
+def test_buses_are_solved_where_somebody_looks():
+    network = compile_network(load_feeder("ieee123"))
+    node = int(np.flatnonzero(with_leaps(network, nobody()).tree.passed >= 0)[0])
+    probes = nobody()._replace(v_node=np.array([node]))
+    leaping = with_leaps(network, probes)
+    assert leaping.tree.passed[node] < 0
+    assert why_solved(leaping, probes)["points"] == 1
