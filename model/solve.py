@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .lanes import WIDTH
 from .machine_state import FLOOR_PU, machine_state
 from .network import Network
 from .solver.ladder import solve_block
@@ -134,26 +133,11 @@ def solve(
         answer.winding_v_pu[:] = 1.0 if start is None else start
         solve_block(tree, state, probes, workspace(tree), answer, *limits)
         return answer
-    state = State._make(map(_in_lanes, state))
-    answer = new_answer(network, probes, state.emf_pu.size)
-    answer.winding_v_pu[:] = 1.0 if start is None else _in_lanes(start)
-    solve_wide(tree, state, probes, *wide_workspace(tree), answer, *limits)
-    if answer.flags.size > scenarios:
-        answer = Answer._make(np.ascontiguousarray(part[..., :scenarios]) for part in answer)
+    answer = new_answer(network, probes, scenarios)
+    answer.winding_v_pu[:] = 1.0 if start is None else start
+    order = np.lexsort((state.far_node, state.edge))
+    solve_wide(tree, state, probes, *wide_workspace(tree), answer, order, *limits)
     return answer
-
-
-def _in_lanes(values: NDArray[Any]) -> NDArray[Any]:
-    """Contiguous, the last scenario repeated until they fill their lanes."""
-    missing = -values.shape[-1] % WIDTH
-    if missing:
-        widths = [(0, 0)] * (values.ndim - 1) + [(0, missing)]
-        values = (
-            np.pad(values, widths, mode="edge")
-            if values.size
-            else np.zeros((*values.shape[:-1], values.shape[-1] + missing), values.dtype)
-        )
-    return np.ascontiguousarray(values)
 
 
 def _check(network: Network, state: State) -> None:

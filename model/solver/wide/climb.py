@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import WIDTH, joined, load_real, splat
-from ...states import State, Tree, Work
+from ...lanes import WIDTH, bits_of, joined, larger, load_real, select, splat
+from ...states import UNEARTHED, State, Tree, Work
+from ..breaks import NOTHING_S, SINGULAR, squared
 from ..ladder import climb_edge
 from ..matrix3 import (
     IDENTITY,
@@ -15,6 +16,7 @@ from ..matrix3 import (
     inverse,
     load,
     minus,
+    outer,
     plus,
     plus_diagonal,
     product,
@@ -39,19 +41,20 @@ from .rows import (
     take_lane,
     take_lane_vector,
 )
-from .work import ALL, PASSED, TWIG, Wide, lane_of
+from .work import PASSED, TWIG, Wide, lane_of
 
 __all__ = ["climb", "mark_regions", "turn_of"]
 
 
 @compiled
-def mark_regions(tree: Tree, state: State, wide: Wide, s: int) -> None:
+def mark_regions(tree: Tree, state: State, wide: Wide) -> None:
     """Note in ``busy`` where something happens, and in which lanes."""
     busy = wide.busy
     for k in range(busy.size):
-        busy[k] = ALL if wide.loose[k] else 0
+        busy[k] = 0
     for lane in range(WIDTH):
-        edge, far = state.edge[s + lane], state.far_node[s + lane]
+        s = wide.scenario[lane]
+        edge, far = state.edge[s], state.far_node[s]
         if edge >= 0:
             q = max(tree.passed[edge], tree.leap[edge])
             busy[wide.place[q] if q >= 0 else edge] |= 1 << lane
@@ -60,9 +63,7 @@ def mark_regions(tree: Tree, state: State, wide: Wide, s: int) -> None:
 
 
 @compiled
-def climb(
-    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, how: tuple[int, bool, bool]
-) -> None:
+def climb(tree: Tree, state: State, wide: Wide, lanes: Work, how: tuple[int, bool, bool]) -> None:
     """Eliminate every node from the leaves to the source, or only carry currents up.
 
     ``how``: the lanes eliminated anew, whether there are any, and whether there are currents
@@ -84,16 +85,21 @@ def climb(
                 store_matrix(wide.w, k, in_lanes(shunt))
             elif busy == 0:
                 continue
-        elif busy != ALL:
-            if a >= 0:
-                climb_lone(tree, wide, k, a, full, fed)
-            else:
-                climb_whole(tree, state, wide, k, s, full, fed)
+        elif a >= 0:
+            climb_lone(tree, wide, k, a, full, fed)
+        elif wide.loose[k]:
+            if not fed:
+                store_triple(wide.y_j, k, times(in_lanes(ZERO), (1 + 0j, 0j, 0j)))
+            climb_loose(tree, wide, k, demand)
+        else:
+            climb_whole(tree, wide, k, full, fed)
         if busy:
             for lane in range(WIDTH):
                 if busy >> lane & 1:
                     work = lane_of(lanes, lane)
-                    flags = climb_region(tree, state, wide, work, k, (lane, s + lane, fed))
+                    flags = climb_region(
+                        tree, state, wide, work, k, (lane, wide.scenario[lane], fed)
+                    )
                     if demand >> lane & 1:
                         wide.flags[lane] |= flags
         if k == 0:
@@ -132,40 +138,32 @@ def in_lanes(shunt: Matrix) -> Matrix:
 @compiled
 def climb_lone(tree: Tree, wide: Wide, k: int, a: int, full: bool, fed: bool) -> None:
     """Past an edge, or a leap, that has a single phase."""
-    y, q = load_entry(wide.y, k, 4 * a), wide.leap[k]
-    if q < 0:
-        z = tree.z_ohm[k, a, a]
-        if full:
-            f = reciprocal(1.0 + z * y)
-            store_entry(wide.f, k, 4 * a, f)
-            store_entry(wide.w, k, 4 * a, y * f)
-        if fed:
-            drawn = load_entry(wide.y_j, k, a)
-            ahead = -(load_entry(wide.f, k, 4 * a) * (z * drawn))
-            store_entry(wide.h_j, k, a, ahead)
-            store_entry(wide.x_j, k, a, drawn + y * ahead)
-        return
-    chain = tree.leap_chain[q]
+    q = wide.leap[k]
     if full:
-        f = reciprocal(chain[0, a, a] + chain[1, a, a] * y)
+        y = load_entry(wide.y, k, 4 * a)
+        if q < 0:
+            f = reciprocal(1.0 + tree.z_ohm[k, a, a] * y)
+            w = y * f
+        else:
+            chain = tree.leap_chain[q]
+            f = reciprocal(chain[0, a, a] + chain[1, a, a] * y)
+            w = (chain[2, a, a] + chain[3, a, a] * y) * f
         store_entry(wide.f, k, 4 * a, f)
-        store_entry(wide.w, k, 4 * a, (chain[2, a, a] + chain[3, a, a] * y) * f)
+        store_entry(wide.w, k, 4 * a, w)
     if fed:
-        drawn = load_entry(wide.y_j, k, a)
-        ahead = -(load_entry(wide.f, k, 4 * a) * (chain[1, a, a] * drawn))
-        store_entry(wide.h_j, k, a, ahead)
-        drawn = chain[3, a, a] * (drawn + y * ahead) + chain[2, a, a] * ahead
+        drawn = load_entry(wide.f, k, 4 * a) * load_entry(wide.y_j, k, a)
         store_entry(wide.x_j, k, a, drawn)
 
 
 @compiled
-def climb_whole(
-    tree: Tree, state: State, wide: Wide, k: int, s: int, full: bool, fed: bool
-) -> None:
-    """Past an edge, or a leap, of several phases, and what stands at its upper end."""
-    y, q = load_matrix(wide.y, k), wide.leap[k]
+def climb_whole(tree: Tree, wide: Wide, k: int, full: bool, fed: bool) -> None:
+    """Past an edge, or a leap, of several phases, and what stands at its upper end.
+
+    A current drawn below is seen from above as F' of it: what is passive is reciprocal.
+    """
     turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
     if full:
+        y, q = load_matrix(wide.y, k), wide.leap[k]
         if q < 0:
             f, w = up(y, load(tree.z_ohm, k))
         else:
@@ -173,49 +171,80 @@ def climb_whole(
             f = inverse(add(product(load(chain, 1), y), load(chain, 0)))
             w = product(add(product(load(chain, 3), y), load(chain, 2)), f)
         if turned:
-            t = turn_of(tree, state, wide, k, s)
+            t = turn_of(tree, wide, k)
             f, w = product(f, t), product(transposed(t), product(w, t))
         store_matrix(wide.f, k, f)
         store_matrix(wide.w, k, w)
     if fed:
         drawn = load_triple(wide.y_j, k)
-        ahead, seen = carry_current(tree, wide, (y, load_matrix(wide.f, k)), (k, q), drawn, turned)
-        if turned:
-            seen = times(transposed(turn_of(tree, state, wide, k, s)), seen)
-        store_triple(wide.h_j, k, ahead)
-        store_triple(wide.x_j, k, seen)
+        if wide.keeps[k]:
+            drawn = keep_ahead(tree, wide, k, drawn, turned)
+        else:
+            drawn = times(transposed(load_matrix(wide.f, k)), drawn)
+        store_triple(wide.x_j, k, drawn)
 
 
 @compiled
-def carry_current(
-    tree: Tree,
-    wide: Wide,
-    own: tuple[Matrix, Matrix],
-    where: tuple[int, int],
-    drawn: Vector,
-    turned: bool,
-) -> tuple[Vector, Vector]:
-    """What a current drawn below makes of the voltage there, and is seen as from above.
+def keep_ahead(tree: Tree, wide: Wide, k: int, drawn: Vector, turned: bool) -> Vector:
+    """Note what a current drawn below makes of the voltage there; returns what is seen of it.
 
-    ``own`` are Y and F of the edge and leap ``where``. F of a turned edge, which has T in it, is
-    made anew.
+    F of a turned edge, which has T in it, is made anew.
     """
-    y, f = own
-    k, q = where
+    y, q = load_matrix(wide.y, k), wide.leap[k]
     if q >= 0:
         chain = tree.leap_chain[q]
-        ahead = minus(times(f, times(load(chain, 1), drawn)))
-        seen = plus(drawn, times(y, ahead))
-        return ahead, plus(times(load(chain, 3), seen), times(load(chain, 2), ahead))
-    z = load(tree.z_ohm, k)
+        ahead = minus(times(load_matrix(wide.f, k), times(load(chain, 1), drawn)))
+        store_triple(wide.h_j, k, ahead)
+        drawn = plus(drawn, times(y, ahead))
+        return plus(times(load(chain, 3), drawn), times(load(chain, 2), ahead))
+    z, f = load(tree.z_ohm, k), load_matrix(wide.f, k)
     if turned:
         f = inverse(plus_diagonal(product(z, y), (1 + 0j, 1 + 0j, 1 + 0j)))
     ahead = minus(times(f, times(z, drawn)))
-    return ahead, plus(drawn, times(y, ahead))
+    store_triple(wide.h_j, k, ahead)
+    drawn = plus(drawn, times(y, ahead))
+    if turned:
+        drawn = times(transposed(turn_of(tree, wide, k)), drawn)
+    return drawn
 
 
 @compiled
-def turn_of(tree: Tree, state: State, wide: Wide, k: int, s: int) -> Matrix:
+def climb_loose(tree: Tree, wide: Wide, k: int, demand: int) -> None:
+    """Past an edge that leaves modes loose at its lower end, as ``breaks.free_modes`` does."""
+    w, x = load_matrix(wide.y, k), load_triple(wide.y_j, k)
+    p, h, z = in_lanes(IDENTITY), times(in_lanes(ZERO), x), load(tree.z_ohm, k)
+    limit = splat(NOTHING_S**2)
+    for i in range(9):
+        limit = larger(limit, SINGULAR**2 * squared(load_entry(wide.y, k, i)))
+    for n in range(tree.loose_from[k], tree.loose_from[k + 1]):
+        e = (tree.loose[n, 0], tree.loose[n, 1], tree.loose[n, 2])
+        down, own, ahead = times(w, e), times(transposed(w), e), times(p, e)
+        driving = e[0] * down[0] + e[1] * down[1] + e[2] * down[2]
+        free = squared(driving) <= limit
+        for lane in range(WIDTH):
+            if bits_of(free) & demand & (1 << lane):
+                wide.flags[lane] |= UNEARTHED
+        scale = select(free, 0j, -reciprocal(select(free, 1 + 0j, driving)))
+        drawn = scale * (e[0] * x[0] + e[1] * x[1] + e[2] * x[2])
+        w, p = add(w, outer(down, own, scale)), add(p, outer(ahead, own, scale))
+        x = plus(x, (drawn * down[0], drawn * down[1], drawn * down[2]))
+        h = plus(h, (drawn * ahead[0], drawn * ahead[1], drawn * ahead[2]))
+    f, seen = up(w, z)
+    more = minus(times(f, times(z, x)))
+    x, h = plus(x, times(w, more)), plus(h, times(p, more))
+    f = product(p, f)
+    if tree.regulator[k] >= 0 or tree.transformer[k] >= 0:
+        t = turn_of(tree, wide, k)
+        back = transposed(t)
+        f, seen, x = product(f, t), product(back, product(seen, t)), times(back, x)
+    store_matrix(wide.f, k, f)
+    store_matrix(wide.w, k, seen)
+    store_triple(wide.h_j, k, h)
+    store_triple(wide.x_j, k, x)
+
+
+@compiled
+def turn_of(tree: Tree, wide: Wide, k: int) -> Matrix:
     """T of what stands at the upper end of edge k, as ``turns.turn_of``."""
     row = tree.regulator[k]
     if row < 0:
@@ -223,7 +252,7 @@ def turn_of(tree: Tree, state: State, wide: Wide, k: int, s: int) -> Matrix:
     t, reference = wide.turn, tree.reference
     store_matrix(t, 0, in_lanes(IDENTITY))
     for i in range(3):
-        more = load_real(state.ratio, (row, i, s)) - 1.0
+        more = load_real(wide.ratio, (row, i, 0)) - 1.0
         store_entry(t, 0, 4 * i, load_entry(t, 0, 4 * i) + more)
         if reference[row, i] >= 0:
             across = 3 * i + reference[row, i]

@@ -6,7 +6,7 @@ from ...compiled import compiled
 from ...lanes import WIDTH, joined, splat
 from ...states import State, Tree, Work
 from ..ladder import descend_edge, neutral_shift
-from ..matrix3 import Vector, load, load_vector, minus, plus, store_vector, times
+from ..matrix3 import Matrix, Vector, load, load_vector, minus, plus, store_vector, times
 from .rows import (
     load_entry,
     load_matrix,
@@ -17,7 +17,7 @@ from .rows import (
     take_lane,
     take_lane_vector,
 )
-from .work import ALL, PASSED, TWIG, Wide, lane_of
+from .work import PASSED, TWIG, Wide, lane_of
 
 __all__ = ["descend", "lift_neutrals", "probe_current"]
 
@@ -42,7 +42,7 @@ def lift_neutrals(tree: Tree, wide: Wide, lanes: Work, fed: bool) -> None:
 
 
 @compiled
-def descend(tree: Tree, state: State, wide: Wide, lanes: Work, s: int, fed: bool) -> None:
+def descend(tree: Tree, state: State, wide: Wide, lanes: Work, fed: bool) -> None:
     """Voltages from the source to the leaves, those of nodes passed by only in busy regions."""
     lone, visits, v_all = tree.lone_phase, wide.visit, wide.v
     for k in range(visits.size):
@@ -50,15 +50,21 @@ def descend(tree: Tree, state: State, wide: Wide, lanes: Work, s: int, fed: bool
         if visit == PASSED:
             continue
         a, busy, above = lone[k], wide.busy[k], wide.above[k]
-        if visit != TWIG and busy != ALL:
+        if visit != TWIG:
             if a >= 0:
-                v1 = load_entry(wide.f, k, 4 * a) * load_entry(v_all, above, a)
+                v1 = load_entry(v_all, above, a)
                 if fed:
-                    v1 = v1 + load_entry(wide.h_j, k, a)
-                store_entry(v_all, k, a, v1)
+                    q = wide.leap[k]
+                    z1 = tree.z_ohm[k, a, a] if q < 0 else tree.leap_chain[q, 1, a, a]
+                    v1 = v1 - z1 * load_entry(wide.y_j, k, a)
+                store_entry(v_all, k, a, load_entry(wide.f, k, 4 * a) * v1)
             else:
-                v = times(load_matrix(wide.f, k), load_triple(v_all, above))
-                if fed:
+                v = load_triple(v_all, above)
+                if fed and not wide.keeps[k]:
+                    z = series_of(tree, wide, k)
+                    v = plus(v, minus(times(z, load_triple(wide.y_j, k))))
+                v = times(load_matrix(wide.f, k), v)
+                if fed and wide.keeps[k]:
                     v = plus(v, load_triple(wide.h_j, k))
                 store_triple(v_all, k, v)
                 if tree.node_phases[k] != 7:
@@ -67,7 +73,14 @@ def descend(tree: Tree, state: State, wide: Wide, lanes: Work, s: int, fed: bool
             for lane in range(WIDTH):
                 if busy >> lane & 1:
                     work = lane_of(lanes, lane)
-                    descend_region(tree, state, wide, work, k, (lane, s + lane, fed))
+                    descend_region(tree, state, wide, work, k, (lane, wide.scenario[lane], fed))
+
+
+@compiled
+def series_of(tree: Tree, wide: Wide, k: int) -> Matrix:
+    """The impedance of an edge, or B of a leap."""
+    q = wide.leap[k]
+    return load(tree.z_ohm, k) if q < 0 else load(tree.leap_chain[q], 1)
 
 
 @compiled

@@ -12,21 +12,19 @@ from ...lanes import (
     smaller,
     splat,
 )
-from ...states import State, Tree
+from ...states import Tree
 from ..assemble import Real
 from .powers import power
-from .work import ALL
+from .work import ALL, Wide
 
 __all__ = ["load_admittance"]
 
 
 @compiled
-def load_admittance(
-    tree: Tree, state: State, n: int, s: int, v_pu: float, floor_pu: float
-) -> complex:
+def load_admittance(tree: Tree, wide: Wide, n: int, v_pu: float, floor_pu: float) -> complex:
     """Admittances of one winding or branch of load n at the voltages across it."""
-    nominal = load_real(state.load_scale, (n, s)) * complex(tree.load_y_s[n])
-    exponent = load_real(state.exponent, (n, s))
+    nominal = load_real(wide.load_scale, (n, 0)) * complex(tree.load_y_s[n])
+    exponent = load_real(wide.exponent, (n, 0))
     by_law = bits_of(exponent < 0.0)
     if by_law == ALL:
         if tree.law_linear[n]:

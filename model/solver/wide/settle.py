@@ -26,11 +26,11 @@ __all__ = ["see_magnitudes", "update_magnitudes"]
 
 @compiled
 def update_magnitudes(
-    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, passes: int, tolerance_pu: float
+    tree: Tree, state: State, wide: Wide, lanes: Work, passes: int, tolerance_pu: float
 ) -> int:
     """Move the voltages towards the solved ones; returns the bits of the lanes that settled."""
     v_pu, history = wide.winding_v_pu, wide.history
-    largest = larger(find_gaps(tree, state, wide, lanes, s), splat(1.0))
+    largest = larger(find_gaps(tree, state, wide, lanes), splat(1.0))
     change = along = across = splat(0.0)
     for n in range(v_pu.shape[0]):
         gap = load_real(history, (2, n, 0))
@@ -53,9 +53,9 @@ def update_magnitudes(
 
 
 @compiled
-def see_magnitudes(tree: Tree, state: State, wide: Wide, lanes: Work, s: int, bits: int) -> None:
+def see_magnitudes(tree: Tree, state: State, wide: Wide, lanes: Work, bits: int) -> None:
     """Take over the solved voltages in the lanes where nothing depends on them."""
-    find_gaps(tree, state, wide, lanes, s)
+    find_gaps(tree, state, wide, lanes)
     own, v_pu = mask_of(bits), wide.winding_v_pu
     for n in range(v_pu.shape[0]):
         value = load_real(v_pu, (n, 0))
@@ -64,10 +64,9 @@ def see_magnitudes(tree: Tree, state: State, wide: Wide, lanes: Work, s: int, bi
 
 
 @compiled
-def find_gaps(tree: Tree, state: State, wide: Wide, lanes: Work, s: int) -> float:
+def find_gaps(tree: Tree, state: State, wide: Wide, lanes: Work) -> float:
     """How far the solved voltages are from those assumed; returns the largest, in pu."""
-    v_pu, history, v_all = wide.winding_v_pu, wide.history, wide.v
-    units = tree.unit_node.size
+    v_all, units = wide.v, tree.unit_node.size
     sourced = tree.machine_unit.size > 0
     largest = splat(0.0)
     for unit in range(units):
@@ -80,7 +79,7 @@ def find_gaps(tree: Tree, state: State, wide: Wide, lanes: Work, s: int) -> floa
         largest = gap_of(wide, 4 * unit + 2, v[2], over, largest)
         if sourced:
             largest = gap_of(wide, 4 * unit + 3, positive(v), over, largest)
-    largest = larger(largest, find_event_gaps(tree, state, wide, lanes, s))
+    largest = larger(largest, find_event_gaps(tree, state, wide, lanes))
     node, first, other = tree.branch_node, tree.branch_from, tree.branch_to
     at = 4 * (units + 1)
     for p in range(node.size):
@@ -100,14 +99,14 @@ def gap_of(wide: Wide, n: int, v: complex, over: float, largest: float) -> float
 
 
 @compiled
-def find_event_gaps(tree: Tree, state: State, wide: Wide, lanes: Work, s: int) -> float:
+def find_event_gaps(tree: Tree, state: State, wide: Wide, lanes: Work) -> float:
     """The same at the upper stub of every event node."""
     v_pu, history, at = wide.winding_v_pu, wide.history, 4 * tree.unit_node.size
     for i in range(4):
         store_real(history, (2, at + i, 0), splat(0.0))
     most = splat(0.0)
     for lane in range(WIDTH):
-        edge = state.edge[s + lane]
+        edge = state.edge[wide.scenario[lane]]
         if edge >= 0:
             for i in range(3):
                 size = magnitude(lanes.stub[lane, 0, i]) / tree.node_v[edge]

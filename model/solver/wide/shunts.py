@@ -31,7 +31,7 @@ NEAR = 0.2  #: an admittance farther from the eliminated one than this share nee
 
 
 @compiled
-def find_demand(tree: Tree, state: State, wide: Wide, s: int, floor_pu: float) -> int:
+def find_demand(tree: Tree, wide: Wide, floor_pu: float) -> int:
     """Branches at their voltages; returns the bits of the lanes that must be eliminated anew.
 
     Where admittances have changed little since, what they draw more than then is a current at
@@ -42,7 +42,7 @@ def find_demand(tree: Tree, state: State, wide: Wide, s: int, floor_pu: float) -
     demand = mask_of(0)
     for p in range(tree.branch_node.size):
         n = tree.branch_load[p]
-        own = load_admittance(tree, state, n, s, load_real(v_pu, (at + p, 0)), floor_pu)
+        own = load_admittance(tree, wide, n, load_real(v_pu, (at + p, 0)), floor_pu)
         store_entry(own_y, p, 0, own)
         past = load_entry(eliminated, p, 0)
         more = own - past
@@ -62,7 +62,6 @@ def set_shunts(
     state: State,
     wide: Wide,
     lanes: Work,
-    s: int,
     how: tuple[int, bool, bool],
     floor_pu: float,
 ) -> None:
@@ -74,15 +73,20 @@ def set_shunts(
     demand, full, fed = how
     y, y_j, v = wide.y, wide.y_j, wide.v
     nothing = splat(0.0)
-    if fed:
-        for k in range(y_j.shape[0]):
+    for k in range(y.shape[0]):
+        a, passed = tree.lone_phase[k], tree.passed[k] >= 0
+        if fed and not passed:
             for i in range(6):
                 store_real(y_j, (k, i, 0), nothing)
+        if not full or passed:
+            continue
+        if a >= 0:
+            store_entry(y, k, 4 * a, nothing + complex(tree.shunt_s[k, a, a]))
+            continue
+        for i in range(9):
+            store_entry(y, k, i, nothing + complex(tree.shunt_s[k, i // 3, i % 3]))
     if full:
-        for k in range(y.shape[0]):
-            for i in range(9):
-                store_entry(y, k, i, nothing + complex(tree.shunt_s[k, i // 3, i % 3]))
-        hang_units(tree, state, wide, lanes, s, floor_pu)
+        hang_units(tree, state, wide, lanes, floor_pu)
     renewed = mask_of(demand)
     node, first, other = tree.branch_node, tree.branch_from, tree.branch_to
     for p in range(node.size):
@@ -107,7 +111,7 @@ def set_shunts(
 
 
 @compiled
-def hang_units(tree: Tree, state: State, wide: Wide, lanes: Work, s: int, floor_pu: float) -> None:
+def hang_units(tree: Tree, state: State, wide: Wide, lanes: Work, floor_pu: float) -> None:
     """Every bank with its loads and machines on its node."""
     units = tree.unit_node.size
     if units == 0:
@@ -121,26 +125,26 @@ def hang_units(tree: Tree, state: State, wide: Wide, lanes: Work, s: int, floor_
         if unit >= 0:
             for i in range(3):
                 seen = load_real(v_pu, (4 * unit + i, 0))
-                own = load_admittance(tree, state, n, s, seen, floor_pu)
+                own = load_admittance(tree, wide, n, seen, floor_pu)
                 store_entry(unit_y, unit, i, load_entry(unit_y, unit, i) + own)
     apart = 0
     for unit in range(units):
         rare = ALL
         if tree.unit_plain[unit]:
-            rare = hang_plain(tree, state, wide, unit, s)
+            rare = hang_plain(tree, state, wide, unit)
         apart |= rare
     if apart:
         for lane in range(WIDTH):
             if apart >> lane & 1:
-                hang_apart(tree, state, wide, lane_of(lanes, lane), lane, s, floor_pu)
+                hang_apart(tree, state, wide, lane_of(lanes, lane), lane, floor_pu)
 
 
 @compiled
-def hang_plain(tree: Tree, state: State, wide: Wide, unit: int, s: int) -> int:
+def hang_plain(tree: Tree, state: State, wide: Wide, unit: int) -> int:
     """A bank with nothing but loads; returns the lanes that have rarer connections."""
     in_wye = in_delta = low_delta = 0
     for lane in range(WIDTH):
-        connection = state.connection[unit, s + lane]
+        connection = state.connection[unit, wide.scenario[lane]]
         in_wye |= int(connection == YG_YG) << lane
         in_delta |= int(connection == D_YG) << lane
         low_delta |= int(connection == YG_D) << lane
@@ -165,9 +169,10 @@ def hang(tree: Tree, wide: Wide, unit: int, bits: int, found: tuple[Matrix, Matr
 
 @compiled
 def hang_apart(
-    tree: Tree, state: State, wide: Wide, work: Work, lane: int, s: int, floor_pu: float
+    tree: Tree, state: State, wide: Wide, work: Work, lane: int, floor_pu: float
 ) -> None:
     """The banks of one scenario that have machines, magnetizing branches or rarer windings."""
+    s = wide.scenario[lane]
     plain, connections = tree.unit_plain, state.connection
     unit_y, node = work.unit_y, tree.unit_node
     for unit in range(plain.size):
@@ -197,7 +202,7 @@ def hang_apart(
 
 @compiled
 def set_region_shunts(
-    tree: Tree, state: State, wide: Wide, lanes: Work, s: int, full: bool, floor_pu: float
+    tree: Tree, state: State, wide: Wide, lanes: Work, full: bool, floor_pu: float
 ) -> None:
     """What happens in each lane: shunts at the event node, and at a second step's node.
 
@@ -205,7 +210,8 @@ def set_region_shunts(
     all that is eliminated anew.
     """
     for lane in range(WIDTH):
-        edge, far = state.edge[s + lane], state.far_node[s + lane]
+        s = wide.scenario[lane]
+        edge, far = state.edge[s], state.far_node[s]
         if edge < 0 and far < 0:
             continue
         work = lane_of(lanes, lane)
@@ -215,7 +221,7 @@ def set_region_shunts(
             if tree.passed[far] < 0:
                 store(work.y, far, ZERO)
             for i in range(3):
-                more, across = state.far_y_s[i, s + lane], state.far_between_y_s[i, s + lane]
+                more, across = state.far_y_s[i, s], state.far_between_y_s[i, s]
                 add_shunt(work.y, far, i, more, across)
             if full and tree.passed[far] < 0:
                 add_lane(wide.y, far, lane, work.y, far)
@@ -228,7 +234,7 @@ def set_region_shunts(
         at = 4 * tree.unit_node.size
         for i in range(3):
             work.winding_v_pu[at + i] = wide.winding_v_pu[at + i, lane]
-        set_event_shunts(tree, state, work, s + lane, floor_pu)
+        set_event_shunts(tree, state, work, s, floor_pu)
         if full and tree.charged:
             for node in (upper, edge):
                 if tree.passed[node] < 0:

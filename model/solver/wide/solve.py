@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiled import compiled, compiled_door
-from ...lanes import WIDTH, load_real, mask_of, select, splat, store_real
+from ...lanes import WIDTH, load_real, splat, store_real
 from ...states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from ..ladder import edge_current, is_sourced
 from ..matrix3 import plus, store_vector, times
@@ -16,6 +17,8 @@ from .rows import load_matrix, load_triple, store_triple
 from .settle import see_magnitudes, update_magnitudes
 from .shunts import find_demand, set_region_shunts, set_shunts
 from .work import ALL, Wide, lane_of
+
+Int = NDArray[np.int64]
 
 __all__ = ["solve_wide"]
 
@@ -30,25 +33,26 @@ def solve_wide(
     wide: Wide,
     lanes: Work,
     answer: Answer,
+    order: Int,
     tolerance_pu: float,
     most_passes: int,
     floor_pu: float,
 ) -> None:
-    """As ``ladder.solve_block``, without loops; S must be a multiple of ``WIDTH``.
+    """As ``ladder.solve_block``, without loops, for the scenarios in ``order``.
 
-    No lane's result depends on what stands in the others.
+    Those that stand together there share lanes: best ones with their event at the same place. No
+    result depends on it.
     """
     sourced = is_sourced(tree)
-    windings = wide.winding_v_pu.shape[0]
-    for s in range(0, state.emf_pu.size, WIDTH):
-        linear, anew = begin(tree, state, wide, lanes, answer, s)
-        mark_regions(tree, state, wide, s)
+    for at in range(0, order.size, WIDTH):
+        linear, anew = begin(tree, state, wide, lanes, answer, order[at : at + WIDTH])
+        mark_regions(tree, state, wide)
         settled = passes = 0
         while settled != ALL and passes < most_passes:
             passes += 1
             demand = ALL
             if tree.branch_node.size:
-                demand = find_demand(tree, state, wide, s, floor_pu)
+                demand = find_demand(tree, wide, floor_pu)
             if passes == 1 or passes > CORRECTED_PASSES:
                 demand = ALL
             demand = (demand | anew) & ~settled
@@ -56,18 +60,18 @@ def solve_wide(
             for lane in range(WIDTH):
                 if demand >> lane & 1:
                     wide.flags[lane] = 0
-            set_shunts(tree, state, wide, lanes, s, (demand, full, fed), floor_pu)
-            set_region_shunts(tree, state, wide, lanes, s, full, floor_pu)
-            climb(tree, state, wide, lanes, s, (demand, full, fed))
-            set_emf(tree, state, wide, s)
+            set_shunts(tree, state, wide, lanes, (demand, full, fed), floor_pu)
+            set_region_shunts(tree, state, wide, lanes, full, floor_pu)
+            climb(tree, state, wide, lanes, (demand, full, fed))
+            set_emf(tree, wide)
             if tree.lifted:
                 lift_neutrals(tree, wide, lanes, fed)
-            descend(tree, state, wide, lanes, s, fed)
+            descend(tree, state, wide, lanes, fed)
             found = linear & ~settled
             if found:
-                see_magnitudes(tree, state, wide, lanes, s, found)
+                see_magnitudes(tree, state, wide, lanes, found)
             if (settled | found) != ALL:
-                more = update_magnitudes(tree, state, wide, lanes, s, passes, tolerance_pu)
+                more = update_magnitudes(tree, state, wide, lanes, passes, tolerance_pu)
                 found |= more & ~settled
             if passes == most_passes:
                 for lane in range(WIDTH):
@@ -75,42 +79,47 @@ def solve_wide(
                         wide.flags[lane] |= NOT_CONVERGED
                 found = ALL & ~settled
             if found:
-                own = mask_of(found)
-                for n in range(windings):
-                    past = load_real(answer.winding_v_pu, (n, s))
-                    value = select(own, load_real(wide.winding_v_pu, (n, 0)), past)
-                    store_real(answer.winding_v_pu, (n, s), value)
-                write(tree, state, probes, wide, lanes, answer, s, (found, passes, fed))
+                write(tree, state, probes, wide, lanes, answer, (found, passes, fed))
             settled |= found
 
 
 @compiled
 def begin(
-    tree: Tree, state: State, wide: Wide, lanes: Work, answer: Answer, s: int
+    tree: Tree, state: State, wide: Wide, lanes: Work, answer: Answer, chosen: Int
 ) -> tuple[int, int]:
-    """Start eight scenarios; returns the bits of the linear ones, and of those that are
-    eliminated in every pass.
+    """Put eight scenarios in lanes; returns the bits of those in which nothing follows a voltage.
 
-    Steps that follow the voltage are, and all where banks or machines stand on the nodes.
+    And of those that are eliminated in every pass: steps that follow the voltage are, and all
+    where banks or machines stand on the nodes.
     """
     linear = anew = 0
     for lane in range(WIDTH):
-        linear |= int(is_linear(tree, state, s + lane)) << lane
-        steady = state.edge[s + lane] < 0 or state.step_exponent[s + lane] == 2.0
+        s = chosen[min(lane, chosen.size - 1)]
+        wide.scenario[lane] = s
+        wide.emf_pu[0, lane] = state.emf_pu[s]
+        for n in range(tree.load_unit.size):
+            wide.load_scale[n, lane] = state.load_scale[n, s]
+            wide.exponent[n, lane] = state.exponent[n, s]
+        for n in range(tree.reference.shape[0]):
+            for i in range(3):
+                wide.ratio[n, i, lane] = state.ratio[n, i, s]
+        for n in range(wide.winding_v_pu.shape[0]):
+            wide.winding_v_pu[n, lane] = answer.winding_v_pu[n, s]
+        linear |= int(is_linear(tree, state, s)) << lane
+        steady = state.edge[s] < 0 or state.step_exponent[s] == 2.0
         anew |= int(not steady or tree.unit_node.size > 0) << lane
         store_vector(lanes.stub[lane], 0, (0j, 0j, 0j))
         store_vector(lanes.stub[lane], 1, (0j, 0j, 0j))
     for n in range(wide.winding_v_pu.shape[0]):
-        store_real(wide.winding_v_pu, (n, 0), load_real(answer.winding_v_pu, (n, s)))
         store_real(wide.history, (0, n, 0), splat(0.0))
         store_real(wide.history, (1, n, 0), splat(0.0))
     return linear, anew
 
 
 @compiled
-def set_emf(tree: Tree, state: State, wide: Wide, s: int) -> None:
+def set_emf(tree: Tree, wide: Wide) -> None:
     """The last row of V."""
-    emf = load_real(state.emf_pu, (s,)) * (tree.v_nominal_v * tree.emf_turn)
+    emf = load_real(wide.emf_pu, (0, 0)) * (tree.v_nominal_v * tree.emf_turn)
     turn = np.exp(-2j * np.pi / 3)
     store_triple(wide.v, wide.y.shape[0], (emf, emf * turn, emf * turn.conjugate()))
 
@@ -123,7 +132,6 @@ def write(
     wide: Wide,
     lanes: Work,
     answer: Answer,
-    s: int,
     which: tuple[int, int, bool],
 ) -> None:
     """Put the phasors of some lanes into the answer.
@@ -137,15 +145,16 @@ def write(
         store_triple(current, 0, probe_current(tree, wide, i_edge[n], i_below[n], fed))
         for lane in range(WIDTH):
             if bits >> lane & 1:
+                s = wide.scenario[lane]
                 for i in range(3):
-                    answer.i[n, i, s + lane] = complex(
+                    answer.i[n, i, s] = complex(
                         current[0, 2 * i, lane], current[0, 2 * i + 1, lane]
                     )
-                if state.edge[s + lane] == i_edge[n]:
+                if state.edge[s] == i_edge[n]:
                     work = lane_of(lanes, lane)
-                    own = edge_current(tree, state, work, s + lane, (i_edge[n], i_below[n], True))
+                    own = edge_current(tree, state, work, s, (i_edge[n], i_below[n], True))
                     for i in range(3):
-                        answer.i[n, i, s + lane] = own[i]
+                        answer.i[n, i, s] = own[i]
     for m in range(tree.machine_unit.size):
         unit = tree.machine_unit[m]
         windings = times(load_matrix(wide.g, unit), load_triple(v, tree.unit_node[unit]))
@@ -153,14 +162,18 @@ def write(
         store_triple(current, 0, (v1, v1, v1))
         for lane in range(WIDTH):
             if bits >> lane & 1:
-                answer.machine_v1_v[m, s + lane] = complex(current[0, 0, lane], current[0, 1, lane])
+                s = wide.scenario[lane]
+                answer.machine_v1_v[m, s] = complex(current[0, 0, lane], current[0, 1, lane])
     for lane in range(WIDTH):
         if bits >> lane & 1:
-            answer.flags[s + lane] = wide.flags[lane]
-            answer.passes[s + lane] = passes
+            s = wide.scenario[lane]
+            for n in range(wide.winding_v_pu.shape[0]):
+                answer.winding_v_pu[n, s] = wide.winding_v_pu[n, lane]
+            answer.flags[s] = wide.flags[lane]
+            answer.passes[s] = passes
             for i in range(3):
-                answer.stub[0, i, s + lane] = lanes.stub[lane, 0, i]
-                answer.stub[1, i, s + lane] = lanes.stub[lane, 1, i]
+                answer.stub[0, i, s] = lanes.stub[lane, 0, i]
+                answer.stub[1, i, s] = lanes.stub[lane, 1, i]
                 for n in range(v_node.size):
                     k = v_node[n]
-                    answer.v[n, i, s + lane] = complex(v[k, 2 * i, lane], v[k, 2 * i + 1, lane])
+                    answer.v[n, i, s] = complex(v[k, 2 * i, lane], v[k, 2 * i + 1, lane])

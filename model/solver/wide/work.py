@@ -35,9 +35,15 @@ class Wide(NamedTuple):
     leap: Int  #: (B,) -1: none
     above: Int  #: (B,) the node above that is not passed by; B, the EMF's row, for node 0
     place: Int  #: (Q,) the node at which a leap is visited
-    loose: NDArray[np.bool_]  #: (B,) every lane is by itself there
+    loose: NDArray[np.bool_]  #: (B,) the edge leaves modes loose
+    keeps: NDArray[np.bool_]  #: (B,) what currents make of the voltage is noted on the way up
     busy: Int  #: (B,) bits of the lanes in which something happens in the region there
+    scenario: Int  #: (WIDTH,) which one each lane has
     flags: Int  #: (WIDTH,)
+    load_scale: NDArray[np.float64]  #: (L, WIDTH) as in ``State``
+    exponent: NDArray[np.float64]  #: (L, WIDTH)
+    ratio: NDArray[np.float64]  #: (R, 3, WIDTH)
+    emf_pu: NDArray[np.float64]  #: (1, WIDTH)
     y: Stack  #: (B, 18, WIDTH)
     f: Stack  #: (B, 18, WIDTH)
     w: Stack  #: (B, 18, WIDTH)
@@ -45,6 +51,7 @@ class Wide(NamedTuple):
     h_j: Stack  #: (B, 6, WIDTH)
     x_j: Stack  #: (B, 6, WIDTH)
     v: Stack  #: (B + 1, 6, WIDTH)
+    change_pu: NDArray[np.float64]  #: (1, WIDTH) of the last pass
     turn: Stack  #: (1, 18, WIDTH) T of a regulator
     current: Stack  #: (1, 6, WIDTH) at a probe
     g: Stack  #: (U, 18, WIDTH)
@@ -69,15 +76,21 @@ def wide_workspace(tree: Tree) -> tuple[Wide, Work]:
         k = region.min() if q < tree.twigs else np.flatnonzero(tree.leap == q)[0]
         visit[k] = TWIG if q < tree.twigs else LEAP
         leap[k], above[k], place[q] = q, tree.leap_from[q], k
-    one = workspace(tree)
+    one, loose = workspace(tree), np.diff(tree.loose_from) > 0
     return Wide(
         visit=visit,
         leap=leap,
         above=above,
         place=place,
-        loose=np.diff(tree.loose_from) > 0,
+        loose=loose,
+        keeps=_keeping(tree, loose),
         busy=np.zeros(nodes, np.int64),
+        scenario=np.zeros(WIDTH, np.int64),
         flags=np.zeros(WIDTH, np.int64),
+        load_scale=_aligned(tree.load_unit.size),
+        exponent=_aligned(tree.load_unit.size),
+        ratio=_aligned(tree.reference.shape[0], 3),
+        emf_pu=_aligned(1),
         y=_aligned(nodes, 18),
         f=_aligned(nodes, 18),
         w=_aligned(nodes, 18),
@@ -85,6 +98,7 @@ def wide_workspace(tree: Tree) -> tuple[Wide, Work]:
         h_j=_aligned(nodes, 6),
         x_j=_aligned(nodes, 6),
         v=_aligned(nodes + 1, 6),
+        change_pu=_aligned(1),
         turn=_aligned(1, 18),
         current=_aligned(1, 6),
         g=_aligned(units, 18),
@@ -95,6 +109,19 @@ def wide_workspace(tree: Tree) -> tuple[Wide, Work]:
         winding_v_pu=_aligned(windings),
         history=_aligned(3, windings),
     ), Work._make(np.zeros((WIDTH, *part.shape), part.dtype) for part in one)
+
+
+def _keeping(tree: Tree, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Edges that have more than an impedance, and all where not everything is reciprocal."""
+    edges = tree.parent.size
+    keeping = loose | (tree.regulator[:edges] >= 0) | (tree.transformer[:edges] >= 0)
+    keeping[0] = True
+    for part in (tree.z_ohm[1:edges], tree.shunt_s):
+        if np.abs(part - part.swapaxes(1, 2)).max(initial=0.0) > 1e-12 * np.abs(part).max(
+            initial=0.0
+        ):
+            keeping[:] = True
+    return keeping | (tree.machine_unit.size > 0)
 
 
 def _aligned(*shape: int) -> NDArray[np.float64]:
