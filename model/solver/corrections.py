@@ -12,7 +12,7 @@ from ..states import State, Tree, Work
 from .assemble import load_admittance
 from .breaks import squared
 from .event_node import climb_event, climb_loose
-from .matrix3 import Vector, load, load_vector, minus, plus, store_vector, times
+from .matrix3 import Vector, load, load_vector, minus, plus, reciprocal, store_vector, times
 from .series import up
 from .turns import transposed, turn_edge, turn_of
 
@@ -76,10 +76,12 @@ def leaps_to_take_apart(tree: Tree, edge: int, far_node: int) -> tuple[int, int]
 @compiled
 def leap_current(tree: Tree, work: Work, k: int, leap: int) -> Vector:
     """What is drawn above the leap that ends at node k, by no voltage; H past it."""
-    chain, drawn = tree.leap_chain[leap], load_vector(work.y_j, k)
-    lost = times(load(chain, 1), drawn)
-    store_vector(work.h_j, k, minus(times(load(work.f, k), lost)))
-    return plus(times(load(chain, 3), drawn), minus(times(load(work.w, k), lost)))
+    chain, y, drawn = tree.leap_chain[leap], load(work.y, k), load_vector(work.y_j, k)
+    z = load(chain, 1)
+    p, _ = up(y, z)
+    ahead = minus(times(p, times(z, drawn)))
+    store_vector(work.h_j, k, ahead)
+    return times(transposed(load(chain, 0)), plus(drawn, times(y, ahead)))
 
 
 @compiled
@@ -120,11 +122,10 @@ def climb_corrections(tree: Tree, state: State, work: Work, s: int) -> None:
         if a >= 0 and k != edge:
             drawn1 = y_j[k, a]
             if leaping:
-                chain = tree.leap_chain[leap]
-                h_j[k, a] = -f_all[k, a, a] * chain[1, a, a] * drawn1
-                drawn1 *= chain[3, a, a]
-                w1 = chain[2, a, a] + chain[3, a, a] * y_all[k, a, a]
-                drawn1 += w1 * h_j[k, a]
+                z1 = tree.leap_chain[leap, 1, a, a]
+                p1 = reciprocal(1.0 + z1 * y_all[k, a, a])
+                h_j[k, a] = -p1 * z1 * drawn1
+                drawn1 *= p1 * tree.leap_chain[leap, 0, a, a]
             else:
                 h_j[k, a] = -f_all[k, a, a] * z_all[k, a, a] * drawn1
                 drawn1 *= f_all[k, a, a]

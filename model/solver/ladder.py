@@ -50,7 +50,6 @@ from .matrix3 import (
     Vector,
     add,
     column_sums,
-    inverse,
     load,
     load_vector,
     minus,
@@ -64,7 +63,7 @@ from .matrix3 import (
 )
 from .series import carry_current, per_fork, up
 from .settle import is_linear, positive, see_magnitudes, update_magnitudes
-from .turns import turn_edge
+from .turns import transposed, turn_edge
 
 __all__ = ["solve_block"]
 
@@ -159,17 +158,16 @@ def climb_leap(tree: Tree, work: Work, k: int, leap: int) -> None:
     a, above, chain = tree.lone_phase[k], tree.leap_from[leap], tree.leap_chain[leap]
     y_all = work.y
     if a >= 0:
-        y1 = y_all[k, a, a]
-        f1 = reciprocal(chain[0, a, a] + chain[1, a, a] * y1)
+        t1, y1 = chain[0, a, a], y_all[k, a, a]
+        f1 = reciprocal(1.0 + chain[1, a, a] * y1) * t1
         work.f[k, a, a] = f1
-        y_all[above, a, a] += (chain[2, a, a] + chain[3, a, a] * y1) * f1
+        y_all[above, a, a] += t1 * y1 * f1 + chain[2, a, a]
         return
-    y = load(y_all, k)
-    f = inverse(add(load(chain, 0), product(load(chain, 1), y)))
-    w = product(add(load(chain, 2), product(load(chain, 3), y)), f)
-    store(work.f, k, f)
-    store(work.w, k, w)
-    store(y_all, above, add(load(y_all, above), w))
+    y, t = load(y_all, k), load(chain, 0)
+    p, w = up(y, load(chain, 1))
+    store(work.f, k, product(p, t))
+    w = product(transposed(t), product(w, t))
+    store(y_all, above, add(load(y_all, above), add(w, load(chain, 2))))
     if is_sourced(tree):
         drawn = leap_current(tree, work, k, leap)
         store_vector(work.y_j, above, plus(load_vector(work.y_j, above), drawn))
