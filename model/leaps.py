@@ -183,10 +183,13 @@ def _regions(passed: Int, leap: Int, leaps: int) -> tuple[Int, Int]:
 
 
 def _lone_phases(tree: Tree, chains: list[_Chain]) -> Int:
-    """(B,) ``Tree.lone_phase``, -1 at the end of a chain that has more phases further up."""
+    """(B,) ``Tree.lone_phase``, -1 at the end of a chain that other phases take part in."""
     lone = tree.lone_phase.copy()
     for chain in chains:
-        if np.any(tree.phases[chain.inner] != tree.phases[chain.end]):
+        a = tree.lone_phase[chain.end]
+        turn, _, shunt_s = chain.matrices
+        others = np.arange(3) != a
+        if turn[a, others].any() or shunt_s[others].any() or shunt_s[:, others].any():
             lone[chain.end] = -1
     return lone
 

@@ -279,7 +279,10 @@ def test_a_chain_is_what_its_nodes_make_one_by_one():
                 worst = max(worst, apart(t.T @ y @ f + y_above, drawn))
             edges = chain_edges(tree, end)
             widest = int(np.bitwise_or.reduce(tree.phases[edges]))
-            assert tree.lone_phase[end] < 0 or widest == tree.phases[end]
+            if tree.lone_phase[end] >= 0:
+                alone = np.arange(3) == tree.lone_phase[end]
+                assert not y_above[~np.outer(alone, alone)].any()
+                assert not f[alone][:, ~alone].any()
             chains += 1
             narrow += widest != tree.phases[end]
             crossed += (tree.transformer[edges] >= 0).any()
