@@ -92,7 +92,7 @@ def hang_edges(feeder: Feeder, pieces: list[Piece | None], spanned: Span, touche
             "leap": np.full(count, -1, np.int64),
             "twigs": 0,
             "leap_from": np.zeros(0, np.int64),
-            "leap_chain": np.zeros((0, 4, 3, 3), z.dtype),
+            "leap_chain": np.zeros((0, 3, 3, 3), z.dtype),
             "region_from": np.zeros(1, np.int64),
             "region_node": np.zeros(0, np.int64),
             "alone": np.eye(chords, dtype=np.bool_),

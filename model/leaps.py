@@ -1,8 +1,8 @@
 """Buses that nothing varies on, passed by in one leap: exactly, and only while nobody looks.
 
-A chain of plain edges is four matrices between its two ends, whatever its lines are built like
-and whatever constant shunts its buses have: capacitors, charging, twigs behind which nothing
-hangs. An event there needs the buses, and gets them back for that scenario.
+A chain of edges is a two-port between its two ends, whatever its lines are built like, with the
+transformers in it and with whatever constant shunts its buses have: capacitors, charging, twigs
+behind which nothing hangs. An event there needs the buses, and gets them back for that scenario.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Chain:
-    """Plain edges in a row."""
+    """Constant edges in a row."""
 
     end: int  #: the node below them
     above: int  #: the node above them
     inner: list[int]  #: nodes between, upwards
-    matrices: Complex  #: (4, 3, 3) A, B, C, D
+    matrices: Complex  #: (3, 3, 3) T, Z, Y
 
 
 def with_leaps(network: Network, probes: Probes) -> Network:
@@ -38,10 +38,10 @@ def with_leaps(network: Network, probes: Probes) -> Network:
     What is seen agrees with the network as it was to rounding.
     """
     tree = network.tree
-    plain = _plain(tree, probes)
-    bare = plain & ~_busy(tree, probes)
+    constant = _constant(tree, probes)
+    bare = constant & ~_busy(tree, probes)
     dry, hung_s = _dry(tree, bare)
-    passable = _passable(tree, plain, bare, dry)
+    passable = _passable(tree, constant, bare, dry)
     roots = _roots(tree, dry, passable)
     chains = _chains(tree, dry, passable, hung_s)
     twigs = [_twig(tree, k, hung_s[k]) for k in roots]
@@ -54,7 +54,7 @@ def with_leaps(network: Network, probes: Probes) -> Network:
         leap=leap,
         twigs=len(roots),
         leap_from=np.array(above, np.int64),
-        leap_chain=np.array(matrices, np.complex128).reshape(-1, 4, 3, 3),
+        leap_chain=np.array(matrices, np.complex128).reshape(-1, 3, 3, 3),
         region_from=region_from,
         region_node=region_node,
         lone_phase=_lone_phases(tree, chains),
@@ -62,18 +62,23 @@ def with_leaps(network: Network, probes: Probes) -> Network:
     return replace(network, tree=leaping)
 
 
-def _plain(tree: Tree, probes: Probes) -> Flags:
-    """(B,) edges that are a constant impedance and nothing else, at which nobody looks.
+def _constant(tree: Tree, probes: Probes) -> Flags:
+    """(B,) edges that are the same in every scenario, at which nobody looks.
 
-    Above a regulator the voltages are what its taps make of those below; loose modes depend on
-    all that hangs below them; a loop leads elsewhere.
+    The taps of regulators are not; loose modes depend on all that hangs below them; a loop leads
+    elsewhere.
     """
     count = tree.parent.size
-    plain = (tree.regulator[:count] < 0) & (tree.transformer[:count] < 0)
-    plain &= ~tree.in_loop & (np.diff(tree.loose_from) == 0)
-    plain[0] = False
-    plain[probes.i_edge[probes.i_edge < count]] = False
-    return np.asarray(plain)
+    constant = (tree.regulator[:count] < 0) & ~tree.in_loop & (np.diff(tree.loose_from) == 0)
+    constant[0] = False
+    constant[probes.i_edge[probes.i_edge < count]] = False
+    return np.asarray(constant)
+
+
+def _turn(tree: Tree, k: int) -> Complex:
+    """(3, 3) T of a constant edge."""
+    row = tree.transformer[k]
+    return np.asarray(tree.turn[row] if row >= 0 else np.eye(3, dtype=np.complex128))
 
 
 def _busy(tree: Tree, probes: Probes) -> Flags:
@@ -90,24 +95,25 @@ def _dry(tree: Tree, bare: Flags) -> tuple[Flags, Complex]:
     for k in range(dry.size - 1, 0, -1):
         parent = tree.parent[k]
         if dry[k]:
-            hung_s[parent] += _seen_from_above(tree.z_ohm[k], hung_s[k])
+            hung_s[parent] += _seen_from_above(tree, k, hung_s[k])
         else:
             dry[parent] = False
     return dry, hung_s
 
 
-def _seen_from_above(z_ohm: Complex, y_s: Complex) -> Complex:
-    """``y_s`` behind a series impedance."""
-    return np.asarray(y_s @ np.linalg.inv(np.eye(3) + z_ohm @ y_s))
+def _seen_from_above(tree: Tree, k: int, y_s: Complex) -> Complex:
+    """``y_s`` behind edge k."""
+    turn = _turn(tree, k)
+    return np.asarray(turn.T @ y_s @ np.linalg.inv(np.eye(3) + tree.z_ohm[k] @ y_s) @ turn)
 
 
-def _passable(tree: Tree, plain: Flags, bare: Flags, dry: Flags) -> Flags:
-    """(B,) bare nodes between two plain edges, besides which there are only twigs."""
+def _passable(tree: Tree, constant: Flags, bare: Flags, dry: Flags) -> Flags:
+    """(B,) bare nodes between two constant edges, besides which there are only twigs."""
     lower = np.flatnonzero(~dry)
     lower = lower[lower > 0]
     wet = np.bincount(tree.parent[lower], minlength=dry.size)
     passable = bare & (wet == 1)
-    passable[tree.parent[lower[~plain[lower]]]] = False
+    passable[tree.parent[lower[~constant[lower]]]] = False
     return np.asarray(passable)
 
 
@@ -118,9 +124,9 @@ def _roots(tree: Tree, dry: Flags, passable: Flags) -> Int:
 
 
 def _twig(tree: Tree, root: int, hung_s: Complex) -> Complex:
-    """(4, 3, 3) of a twig, into which no current goes but its own."""
-    one, none = np.eye(3), np.zeros((3, 3))
-    return np.array([one, none, _seen_from_above(tree.z_ohm[root], hung_s), one])
+    """(3, 3, 3) of a twig, at whose end nothing is."""
+    nothing = np.zeros((3, 3))
+    return np.array([nothing, nothing, _seen_from_above(tree, root, hung_s)])
 
 
 def _chains(tree: Tree, dry: Flags, passable: Flags, hung_s: Complex) -> list[_Chain]:
@@ -132,23 +138,26 @@ def _chains(tree: Tree, dry: Flags, passable: Flags, hung_s: Complex) -> list[_C
 def _chain(tree: Tree, end: int, passable: Flags, hung_s: Complex) -> _Chain:
     """Climb from ``end`` to the first node that stays.
 
-    From  V_up = A V + B I,  I_up = C V + D I  just below a node with the shunt Y, under an edge
-    of the impedance Z, to the upper end of that edge:
+    Two-ports  V_low = T V_up - Z I_low,  I_up = T' I_low + Y V_up  exist also where T has no
+    inverse. A node's shunt below an edge T1, Z1 adds to Y, and past the edge, with
+    G = (I + Z1 Y)^-1,
 
-        C += Y A,  D += Y B,  A += Z C,  B += Z D.
+        Z += T G Z1 T',  Y <- T1' Y G T1,  T <- T G T1.
 
-    Where an edge lacks a phase its Z is zero, no current flows and the voltage is carried on.
+    Where a line lacks a phase its Z is zero, no current flows and the voltage is carried on.
     """
-    one = np.eye(3, dtype=np.complex128)
-    a, b, c, d = one, tree.z_ohm[end], np.zeros_like(one), one
+    one = np.eye(3)
+    t, z, y = _turn(tree, end), tree.z_ohm[end], np.zeros((3, 3), np.complex128)
     inner: list[int] = []
     node = int(tree.parent[end])
     while passable[node]:
         inner.append(node)
-        c, d = c + hung_s[node] @ a, d + hung_s[node] @ b
-        a, b = a + tree.z_ohm[node] @ c, b + tree.z_ohm[node] @ d
+        z1, t1 = tree.z_ohm[node], _turn(tree, node)
+        y = y + hung_s[node]
+        g = np.linalg.inv(one + z1 @ y)
+        z, y, t = z + t @ g @ z1 @ t.T, t1.T @ y @ g @ t1, t @ g @ t1
         node = int(tree.parent[node])
-    return _Chain(end=end, above=node, inner=inner, matrices=np.array([a, b, c, d]))
+    return _Chain(end=end, above=node, inner=inner, matrices=np.array([t, z, y]))
 
 
 def _numbers(tree: Tree, dry: Flags, roots: Int, chains: list[_Chain]) -> tuple[Int, Int]:
@@ -174,10 +183,13 @@ def _regions(passed: Int, leap: Int, leaps: int) -> tuple[Int, Int]:
 
 
 def _lone_phases(tree: Tree, chains: list[_Chain]) -> Int:
-    """(B,) ``Tree.lone_phase``, -1 at the end of a chain that has more phases further up."""
+    """(B,) ``Tree.lone_phase``, -1 at the end of a chain that other phases take part in."""
     lone = tree.lone_phase.copy()
     for chain in chains:
-        if np.any(tree.phases[chain.inner] != tree.phases[chain.end]):
+        a = tree.lone_phase[chain.end]
+        turn, _, shunt_s = chain.matrices
+        others = np.arange(3) != a
+        if turn[a, others].any() or shunt_s[others].any() or shunt_s[:, others].any():
             lone[chain.end] = -1
     return lone
 
@@ -187,7 +199,7 @@ def why_solved(network: Network, probes: Probes) -> dict[str, int]:
 
     ``loads``: loads, machines or transformers hang there; ``points``: a probe looks there;
     ``forks``: the network forks there; ``others``: the source, loops, and either side of
-    regulators, in-line transformers and edges that do not bring all phases.
+    regulators, ungrounded windings and edges that do not bring all phases.
     """
     tree = network.tree
     count = tree.parent.size

@@ -71,8 +71,8 @@ class Tree(NamedTuple):
     leap: Int  #: (B,) the leap that ends at this node; -1: none
     twigs: int  #: the first leaps, which end nowhere: nothing hangs on what they pass by
     leap_from: Int  #: (Q,) node above each leap
-    leap_chain: Complex  #: (Q, 4, 3, 3) A, B, C, D: above it V is A V + B I and I is C V + D I, of
-    #: V at its end node and I into what hangs there; of a twig C alone counts
+    leap_chain: Complex  #: (Q, 3, 3, 3) T, Z, Y: V is T V_above - Z I at its end node, I what flows
+    #: into that; T' I + Y V_above flows in above; of a twig Y alone counts
     region_from: Int  #: (Q + 1,) leap q has the nodes ``region_from[q]`` to ``region_from[q + 1]``
     region_node: Int  #: those it passes by and the one that it ends at, children before parents
     shunt_s: Complex  #: (B, 3, 3) fixed shunts on each node: capacitors, charging, windings

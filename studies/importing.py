@@ -155,7 +155,7 @@ def _count_buses(work: _Work) -> None:
         "",
         f"{kept} of {count} buses are solved in every scenario: {why['loads']} with loads or "
         f"machines, {why['points']} that points look at, {why['forks']} forks, {why['others']} at "
-        f"the source, regulators, in-line transformers or in loops; the other {count - kept} are "
+        f"the source, regulators, ungrounded windings or in loops; the other {count - kept} are "
         "passed by, exactly, until an event happens there",
     ]
     work.parts["merged"] = {"buses": count, "kept": kept, "why": why}
