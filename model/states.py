@@ -196,6 +196,7 @@ class Work(NamedTuple):
     stub: Complex  #: (2, 3) voltages of p and q
     winding_v_pu: Real  #: (N,) the scenario's ``Answer.winding_v_pu``
     history: Real  #: (3, N) of these: the last pass's, its gaps, and this pass's gaps
+    follows: Real  #: (1,) how much solved voltages move with the assumed ones
 
 
 def workspace(tree: Tree) -> Work:
@@ -238,4 +239,5 @@ def workspace(tree: Tree) -> Work:
         stub=zeros(2, 3),
         winding_v_pu=np.zeros(windings),
         history=np.zeros((3, windings)),
+        follows=np.zeros(1),
     )

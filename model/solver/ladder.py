@@ -283,10 +283,10 @@ def solve_block(
         for n in range(winding_v_pu.size):
             winding_v_pu[n] = winding_out[n, s]
             history[0, n] = history[1, n] = 0.0
-        settled = False
+        settled = linear
         flags = 0
         passes = 0
-        while not settled and passes < most_passes:
+        while passes == 0 or (not settled and passes < most_passes):
             passes += 1
             set_admittances(tree, state, work, s, floor_pu)
             flags = climb(tree, state, work, s)
@@ -297,7 +297,9 @@ def solve_block(
                 store_vector(v, last, lifted)
                 flags |= more
             descend(tree, state, work, s, fed)
-            settled = linear or update_magnitudes(tree, state, work, s, passes) <= tolerance_pu
+            if linear:
+                break
+            settled = update_magnitudes(tree, state, work, s, passes) <= tolerance_pu
         if linear:
             see_magnitudes(tree, state, work, s)
         answer.flags[s] = flags if settled else flags | NOT_CONVERGED

@@ -9,30 +9,36 @@ from ..compiled import compiled
 from ..states import State, Tree, Work
 from .matrix3 import Vector, load, load_vector, plus, times
 
-__all__ = ["is_linear", "positive", "see_magnitudes", "update_magnitudes"]
+__all__ = ["is_linear", "is_steady", "positive", "see_magnitudes", "update_magnitudes"]
 
 Real = NDArray[np.float64]
 
 SECANT_PASSES = 60  #: by then the secant has settled the loads, or it wanders
 PLAIN_PASSES = 260  #: by then plain steps have; what rounding still moves takes short ones
 SHORT_STEP = 0.35
+TINY = 1e-300  #: less than any voltage that counts
 
 
 @compiled
 def update_magnitudes(tree: Tree, state: State, work: Work, s: int, passes: int) -> float:
-    """Move winding and step voltages towards the solved ones; returns the largest gap.
+    """Move winding and step voltages towards the solved ones; returns the error of these.
 
-    The gap is in pu, of the largest voltage where that exceeds nominal. From the second pass
-    on the step follows the secant through this pass and the last (Anderson's mixing of depth
+    The largest gap between assumed and solved, in pu of the largest voltage where that exceeds
+    nominal, bounds the error of what was assumed. The solved ones move by only part of what the
+    assumed ones do, at most as much as two passes have shown, and their error is smaller by that.
+    From the second
+    pass on the step follows the secant through this pass and the last (Anderson's mixing of depth
     one), which also ends cycles and creeping near collapse; what wanders all the same settles
     in plain steps.
     """
     v_pu, history = work.winding_v_pu, work.history
     largest = max(1.0, find_gaps(tree, state, work, s))
-    change = along = across = 0.0
+    change = along = across = assumed = solved = 0.0
     for n in range(v_pu.size):
         gap = history[2, n]
         turn = gap - history[1, n]
+        moved = v_pu[n] - history[0, n]
+        assumed, solved = max(assumed, abs(moved)), max(solved, abs(moved + turn))
         change = max(change, abs(gap))
         along += gap * turn
         across += turn * turn
@@ -45,7 +51,11 @@ def update_magnitudes(tree: Tree, state: State, work: Work, s: int, passes: int)
         v_pu[n] = max(value + step * gap - back * moved, 0.0)
         history[0, n] = value
         history[1, n] = gap
-    return change / largest
+    if passes == 1:
+        work.follows[0] = 0.0
+        return change / largest
+    work.follows[0] = max(work.follows[0], solved / max(assumed - solved, solved, TINY))
+    return change / largest * work.follows[0]
 
 
 @compiled
@@ -122,11 +132,18 @@ def positive(v: Vector) -> complex:
 @compiled
 def is_linear(tree: Tree, state: State, s: int) -> bool:
     """Whether nothing in scenario ``s`` depends on the magnitude of a voltage."""
-    exponent, follows, machine_va = state.exponent, state.machine_exponent, state.machine_va
-    law_linear = tree.law_linear
-    linear = bool(state.edge[s] < 0 or state.step_exponent[s] == 2.0)
+    exponent, law_linear = state.exponent, tree.law_linear
+    linear = is_steady(state, s)
     for n in range(exponent.shape[0]):
         linear &= exponent[n, s] == 2.0 or (exponent[n, s] < 0.0 and law_linear[n])
+    return linear
+
+
+@compiled
+def is_steady(state: State, s: int) -> bool:
+    """Whether no machine and no step follows a voltage."""
+    follows, machine_va = state.machine_exponent, state.machine_va
+    linear = bool(state.edge[s] < 0 or state.step_exponent[s] == 2.0)
     for m in range(follows.shape[0]):
         linear &= follows[m, s] == 2.0 or machine_va[m, s] == 0.0
     return linear

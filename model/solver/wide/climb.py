@@ -146,13 +146,17 @@ def climb_lone(tree: Tree, wide: Wide, k: int, a: int, full: bool, fed: bool) ->
             w = y * f
         else:
             chain = tree.leap_chain[q]
-            f = reciprocal(chain[0, a, a] + chain[1, a, a] * y)
-            w = (chain[2, a, a] + chain[3, a, a] * y) * f
+            f = reciprocal(1.0 + chain[1, a, a] * y) * chain[0, a, a]
+            w = chain[0, a, a] * (y * f) + chain[2, a, a]
         store_entry(wide.f, k, 4 * a, f)
         store_entry(wide.w, k, 4 * a, w)
     if fed:
-        drawn = load_entry(wide.f, k, 4 * a) * load_entry(wide.y_j, k, a)
-        store_entry(wide.x_j, k, a, drawn)
+        drawn = load_entry(wide.y_j, k, a)
+        store_entry(wide.x_j, k, a, load_entry(wide.f, k, 4 * a) * drawn)
+        if q >= 0:
+            z = tree.leap_chain[q, 1, a, a]
+            own = reciprocal(1.0 + z * load_entry(wide.y, k, 4 * a))
+            store_entry(wide.h_j, k, a, -(own * (z * drawn)))
 
 
 @compiled
@@ -168,8 +172,10 @@ def climb_whole(tree: Tree, wide: Wide, k: int, full: bool, fed: bool) -> None:
             f, w = up(y, load(tree.z_ohm, k))
         else:
             chain = tree.leap_chain[q]
-            f = inverse(add(product(load(chain, 1), y), load(chain, 0)))
-            w = product(add(product(load(chain, 3), y), load(chain, 2)), f)
+            f, _ = up(y, load(chain, 1))
+            f = product(f, load(chain, 0))
+            w = product(transposed(load(chain, 0)), product(y, f))
+            w = add(w, load(chain, 2))
         if turned:
             t = turn_of(tree, wide, k)
             f, w = product(f, t), product(transposed(t), product(w, t))
@@ -188,21 +194,17 @@ def climb_whole(tree: Tree, wide: Wide, k: int, full: bool, fed: bool) -> None:
 def keep_ahead(tree: Tree, wide: Wide, k: int, drawn: Vector, turned: bool) -> Vector:
     """Note what a current drawn below makes of the voltage there; returns what is seen of it.
 
-    F of a turned edge, which has T in it, is made anew.
+    Where F has T in it, that of the impedance alone is made anew.
     """
-    y, q = load_matrix(wide.y, k), wide.leap[k]
-    if q >= 0:
-        chain = tree.leap_chain[q]
-        ahead = minus(times(load_matrix(wide.f, k), times(load(chain, 1), drawn)))
-        store_triple(wide.h_j, k, ahead)
-        drawn = plus(drawn, times(y, ahead))
-        return plus(times(load(chain, 3), drawn), times(load(chain, 2), ahead))
-    z, f = load(tree.z_ohm, k), load_matrix(wide.f, k)
-    if turned:
+    y, f, q = load_matrix(wide.y, k), load_matrix(wide.f, k), wide.leap[k]
+    z = load(tree.z_ohm, k) if q < 0 else load(tree.leap_chain[q], 1)
+    if turned or q >= 0:
         f = inverse(plus_diagonal(product(z, y), (1 + 0j, 1 + 0j, 1 + 0j)))
     ahead = minus(times(f, times(z, drawn)))
     store_triple(wide.h_j, k, ahead)
     drawn = plus(drawn, times(y, ahead))
+    if q >= 0:
+        return times(transposed(load(tree.leap_chain[q], 0)), drawn)
     if turned:
         drawn = times(transposed(turn_of(tree, wide, k)), drawn)
     return drawn

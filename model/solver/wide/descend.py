@@ -6,7 +6,7 @@ from ...compiled import compiled
 from ...lanes import WIDTH, joined, splat
 from ...states import State, Tree, Work
 from ..ladder import descend_edge, neutral_shift
-from ..matrix3 import Matrix, Vector, load, load_vector, minus, plus, store_vector, times
+from ..matrix3 import Vector, load, load_vector, minus, plus, store_vector, times
 from .rows import (
     load_entry,
     load_matrix,
@@ -52,17 +52,18 @@ def descend(tree: Tree, state: State, wide: Wide, lanes: Work, fed: bool) -> Non
         a, busy, above = lone[k], wide.busy[k], wide.above[k]
         if visit != TWIG:
             if a >= 0:
-                v1 = load_entry(v_all, above, a)
-                if fed:
-                    q = wide.leap[k]
-                    z1 = tree.z_ohm[k, a, a] if q < 0 else tree.leap_chain[q, 1, a, a]
-                    v1 = v1 - z1 * load_entry(wide.y_j, k, a)
-                store_entry(v_all, k, a, load_entry(wide.f, k, 4 * a) * v1)
+                v1, kept = load_entry(v_all, above, a), wide.leap[k] >= 0
+                if fed and not kept:
+                    v1 = v1 - tree.z_ohm[k, a, a] * load_entry(wide.y_j, k, a)
+                v1 = load_entry(wide.f, k, 4 * a) * v1
+                if fed and kept:
+                    v1 = v1 + load_entry(wide.h_j, k, a)
+                store_entry(v_all, k, a, v1)
             else:
                 v = load_triple(v_all, above)
                 if fed and not wide.keeps[k]:
-                    z = series_of(tree, wide, k)
-                    v = plus(v, minus(times(z, load_triple(wide.y_j, k))))
+                    lost = times(load(tree.z_ohm, k), load_triple(wide.y_j, k))
+                    v = plus(v, minus(lost))
                 v = times(load_matrix(wide.f, k), v)
                 if fed and wide.keeps[k]:
                     v = plus(v, load_triple(wide.h_j, k))
@@ -74,13 +75,6 @@ def descend(tree: Tree, state: State, wide: Wide, lanes: Work, fed: bool) -> Non
                 if busy >> lane & 1:
                     work = lane_of(lanes, lane)
                     descend_region(tree, state, wide, work, k, (lane, wide.scenario[lane], fed))
-
-
-@compiled
-def series_of(tree: Tree, wide: Wide, k: int) -> Matrix:
-    """The impedance of an edge, or B of a leap."""
-    q = wide.leap[k]
-    return load(tree.z_ohm, k) if q < 0 else load(tree.leap_chain[q], 1)
 
 
 @compiled

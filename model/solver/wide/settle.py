@@ -17,7 +17,7 @@ from ...lanes import (
 )
 from ...states import State, Tree, Work
 from ..matrix3 import plus, times
-from ..settle import PLAIN_PASSES, SECANT_PASSES, SHORT_STEP, magnitude, positive
+from ..settle import PLAIN_PASSES, SECANT_PASSES, SHORT_STEP, TINY, magnitude, positive
 from .rows import load_entry, load_matrix, load_triple
 from .work import Wide
 
@@ -31,10 +31,13 @@ def update_magnitudes(
     """Move the voltages towards the solved ones; returns the bits of the lanes that settled."""
     v_pu, history = wide.winding_v_pu, wide.history
     largest = larger(find_gaps(tree, state, wide, lanes), splat(1.0))
-    change = along = across = splat(0.0)
+    change = along = across = assumed = solved = splat(0.0)
     for n in range(v_pu.shape[0]):
         gap = load_real(history, (2, n, 0))
         turn = gap - load_real(history, (1, n, 0))
+        moved = load_real(v_pu, (n, 0)) - load_real(history, (0, n, 0))
+        assumed = larger(assumed, magnitude_of(moved))
+        solved = larger(solved, magnitude_of(moved + turn))
         change = larger(change, magnitude_of(gap))
         along = along + gap * turn
         across = across + turn * turn
@@ -49,7 +52,13 @@ def update_magnitudes(
         store_real(v_pu, (n, 0), larger(value + step * gap - back * moved, splat(0.0)))
         store_real(history, (0, n, 0), value)
         store_real(history, (1, n, 0), gap)
-    return bits_of(change <= tolerance_pu * largest)
+    error = change / largest
+    if passes > 1:
+        share = solved / larger(larger(assumed - solved, solved), splat(TINY))
+        share = larger(share, load_real(wide.follows, (0, 0)))
+        store_real(wide.follows, (0, 0), share)
+        error = error * share
+    return bits_of(error <= tolerance_pu)
 
 
 @compiled

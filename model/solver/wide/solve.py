@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled, compiled_door
-from ...lanes import WIDTH, load_real, splat, store_real
+from ...lanes import WIDTH, bits_of, load_real, splat, store_real
 from ...states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from ..ladder import edge_current, is_sourced
 from ..matrix3 import plus, store_vector, times
-from ..settle import is_linear, positive
+from ..settle import is_steady, positive
 from .climb import climb, mark_regions
 from .descend import descend, lift_neutrals, probe_current
 from .rows import load_matrix, load_triple, store_triple
@@ -92,28 +92,46 @@ def begin(
     And of those that are eliminated in every pass: steps that follow the voltage are, and all
     where banks or machines stand on the nodes.
     """
-    linear = anew = 0
+    scenario, last = wide.scenario, chosen.size - 1
     for lane in range(WIDTH):
-        s = chosen[min(lane, chosen.size - 1)]
-        wide.scenario[lane] = s
+        scenario[lane] = chosen[min(lane, last)]
+    for n in range(tree.load_unit.size):
+        for lane in range(WIDTH):
+            wide.load_scale[n, lane] = state.load_scale[n, scenario[lane]]
+            wide.exponent[n, lane] = state.exponent[n, scenario[lane]]
+    for n in range(wide.winding_v_pu.shape[0]):
+        for lane in range(WIDTH):
+            wide.winding_v_pu[n, lane] = answer.winding_v_pu[n, scenario[lane]]
+        store_real(wide.history, (0, n, 0), splat(0.0))
+        store_real(wide.history, (1, n, 0), splat(0.0))
+    store_real(wide.follows, (0, 0), splat(0.0))
+    linear = linear_loads(tree, wide)
+    anew = ALL if tree.unit_node.size else 0
+    for lane in range(WIDTH):
+        s = scenario[lane]
         wide.emf_pu[0, lane] = state.emf_pu[s]
-        for n in range(tree.load_unit.size):
-            wide.load_scale[n, lane] = state.load_scale[n, s]
-            wide.exponent[n, lane] = state.exponent[n, s]
         for n in range(tree.reference.shape[0]):
             for i in range(3):
                 wide.ratio[n, i, lane] = state.ratio[n, i, s]
-        for n in range(wide.winding_v_pu.shape[0]):
-            wide.winding_v_pu[n, lane] = answer.winding_v_pu[n, s]
-        linear |= int(is_linear(tree, state, s)) << lane
-        steady = state.edge[s] < 0 or state.step_exponent[s] == 2.0
-        anew |= int(not steady or tree.unit_node.size > 0) << lane
+        linear &= ~(int(not is_steady(state, s)) << lane)
+        if state.edge[s] >= 0 and state.step_exponent[s] != 2.0:
+            anew |= 1 << lane
         store_vector(lanes.stub[lane], 0, (0j, 0j, 0j))
         store_vector(lanes.stub[lane], 1, (0j, 0j, 0j))
-    for n in range(wide.winding_v_pu.shape[0]):
-        store_real(wide.history, (0, n, 0), splat(0.0))
-        store_real(wide.history, (1, n, 0), splat(0.0))
     return linear, anew
+
+
+@compiled
+def linear_loads(tree: Tree, wide: Wide) -> int:
+    """The bits of the lanes whose loads are all constant impedance."""
+    linear = ALL
+    for n in range(tree.load_unit.size):
+        exponent = load_real(wide.exponent, (n, 0))
+        plain = exponent == 2.0
+        if tree.law_linear[n]:
+            plain = plain | (exponent < 0.0)
+        linear &= bits_of(plain)
+    return linear
 
 
 @compiled
@@ -141,6 +159,10 @@ def write(
     bits, passes, fed = which
     v_node, i_edge, i_below = probes.v_node, probes.i_edge, probes.i_below
     v, current = wide.v, wide.current
+    for n in range(wide.winding_v_pu.shape[0]):
+        for lane in range(WIDTH):
+            if bits >> lane & 1:
+                answer.winding_v_pu[n, wide.scenario[lane]] = wide.winding_v_pu[n, lane]
     for n in range(i_edge.size):
         store_triple(current, 0, probe_current(tree, wide, i_edge[n], i_below[n], fed))
         for lane in range(WIDTH):
@@ -167,8 +189,6 @@ def write(
     for lane in range(WIDTH):
         if bits >> lane & 1:
             s = wide.scenario[lane]
-            for n in range(wide.winding_v_pu.shape[0]):
-                answer.winding_v_pu[n, s] = wide.winding_v_pu[n, lane]
             answer.flags[s] = wide.flags[lane]
             answer.passes[s] = passes
             for i in range(3):

@@ -51,7 +51,7 @@ class Wide(NamedTuple):
     h_j: Stack  #: (B, 6, WIDTH)
     x_j: Stack  #: (B, 6, WIDTH)
     v: Stack  #: (B + 1, 6, WIDTH)
-    change_pu: NDArray[np.float64]  #: (1, WIDTH) of the last pass
+    follows: NDArray[np.float64]  #: (1, WIDTH)
     turn: Stack  #: (1, 18, WIDTH) T of a regulator
     current: Stack  #: (1, 6, WIDTH) at a probe
     g: Stack  #: (U, 18, WIDTH)
@@ -98,7 +98,7 @@ def wide_workspace(tree: Tree) -> tuple[Wide, Work]:
         h_j=_aligned(nodes, 6),
         x_j=_aligned(nodes, 6),
         v=_aligned(nodes + 1, 6),
-        change_pu=_aligned(1),
+        follows=_aligned(1),
         turn=_aligned(1, 18),
         current=_aligned(1, 6),
         g=_aligned(units, 18),
@@ -115,6 +115,7 @@ def _keeping(tree: Tree, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Edges that have more than an impedance, and all where not everything is reciprocal."""
     edges = tree.parent.size
     keeping = loose | (tree.regulator[:edges] >= 0) | (tree.transformer[:edges] >= 0)
+    keeping |= tree.leap >= 0
     keeping[0] = True
     for part in (tree.z_ohm[1:edges], tree.shunt_s):
         if np.abs(part - part.swapaxes(1, 2)).max(initial=0.0) > 1e-12 * np.abs(part).max(
@@ -167,4 +168,5 @@ def lane_of(lanes: Work, lane: int) -> Work:
         lanes.stub[lane],
         lanes.winding_v_pu[lane],
         lanes.history[lane],
+        lanes.follows[lane],
     )
