@@ -13,12 +13,10 @@ from ..matrix3 import (
     Matrix,
     Vector,
     add,
-    inverse,
     load,
     minus,
     outer,
     plus,
-    plus_diagonal,
     product,
     reciprocal,
     store,
@@ -70,52 +68,93 @@ def climb(tree: Tree, state: State, wide: Wide, lanes: Work, how: tuple[int, boo
     that no voltage drives.
     """
     demand, full, fed = how
-    lone, visits = tree.lone_phase, wide.visit
-    for k in range(visits.size - 1, -1, -1):
-        visit = visits[k]
-        if visit == PASSED:
+    for k in range(wide.visit.size - 1, -1, -1):
+        if wide.visit[k] == PASSED:
             continue
-        a, busy, above = lone[k], wide.busy[k], wide.above[k]
-        if visit == TWIG:
+        a, above = tree.lone_phase[k], wide.above[k]
+        if wide.visit[k] == TWIG:
             if full:
-                shunt = load(tree.leap_chain[wide.leap[k]], 2)
-                if busy == 0:
-                    add_matrix(wide.y, above, shunt)
-                    continue
-                store_matrix(wide.w, k, in_lanes(shunt))
-            elif busy == 0:
-                continue
+                put_matrix(wide, k, in_lanes(load(tree.leap_chain[wide.leap[k]], 2)))
+            if fed and wide.busy[k]:
+                store_triple(wide.x_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
         elif a >= 0:
-            climb_lone(tree, wide, k, a, full, fed)
-        elif wide.loose[k]:
-            if not fed:
-                store_triple(wide.y_j, k, times(in_lanes(ZERO), (1 + 0j, 0j, 0j)))
-            climb_loose(tree, wide, k, demand)
-        else:
-            climb_whole(tree, wide, k, full, fed)
-        if busy:
-            for lane in range(WIDTH):
-                if busy >> lane & 1:
-                    work = lane_of(lanes, lane)
-                    flags = climb_region(
-                        tree, state, wide, work, k, (lane, wide.scenario[lane], fed)
-                    )
-                    if demand >> lane & 1:
-                        wide.flags[lane] |= flags
-        if k == 0:
-            continue
-        if a >= 0 and visit != TWIG:
             if full:
-                y1 = load_entry(wide.y, above, 4 * a) + load_entry(wide.w, k, 4 * a)
-                store_entry(wide.y, above, 4 * a, y1)
+                put_entry(wide, k, a, climb_lone(tree, wide, k, a))
             if fed:
-                drawn1 = load_entry(wide.y_j, above, a) + load_entry(wide.x_j, k, a)
-                store_entry(wide.y_j, above, a, drawn1)
-            continue
-        if full:
-            add_matrix(wide.y, above, load_matrix(wide.w, k))
-        if fed and visit != TWIG:
-            add_vector(wide.y_j, above, load_triple(wide.x_j, k))
+                put_drawn_entry(wide, k, a, carry_lone(tree, wide, k, a))
+        elif wide.loose[k]:
+            climb_loose(tree, wide, k, demand, fed)
+        else:
+            if full:
+                put_matrix(wide, k, climb_whole(tree, wide, k))
+            if fed:
+                put_drawn(wide, k, carry_whole(tree, wide, k))
+        if is_kept(wide, k):
+            climb_regions(tree, state, wide, lanes, k, (demand, fed))
+            if k and full:
+                add_matrix(wide.y, above, load_matrix(wide.w, k))
+            if k and fed:
+                add_vector(wide.y_j, above, load_triple(wide.x_j, k))
+
+
+@compiled
+def is_kept(wide: Wide, k: int) -> bool:
+    """Whether W and X of edge k are looked at before they go up."""
+    return wide.kept[k] or wide.busy[k] != 0
+
+
+@compiled
+def put_matrix(wide: Wide, k: int, w: Matrix) -> None:
+    """W of edge k, to where it is kept or else to the node above."""
+    if is_kept(wide, k):
+        store_matrix(wide.w, k, w)
+    else:
+        add_matrix(wide.y, wide.above[k], w)
+
+
+@compiled
+def put_drawn(wide: Wide, k: int, drawn: Vector) -> None:
+    """X of edge k likewise."""
+    if is_kept(wide, k):
+        store_triple(wide.x_j, k, drawn)
+    else:
+        add_vector(wide.y_j, wide.above[k], drawn)
+
+
+@compiled
+def put_entry(wide: Wide, k: int, a: int, w: complex) -> None:
+    """W of an edge with a single phase."""
+    if is_kept(wide, k):
+        store_entry(wide.w, k, 4 * a, w)
+    else:
+        above = wide.above[k]
+        store_entry(wide.y, above, 4 * a, load_entry(wide.y, above, 4 * a) + w)
+
+
+@compiled
+def put_drawn_entry(wide: Wide, k: int, a: int, drawn: complex) -> None:
+    """X of an edge with a single phase."""
+    if is_kept(wide, k):
+        store_entry(wide.x_j, k, a, drawn)
+    else:
+        above = wide.above[k]
+        store_entry(wide.y_j, above, a, load_entry(wide.y_j, above, a) + drawn)
+
+
+@compiled
+def climb_regions(
+    tree: Tree, state: State, wide: Wide, lanes: Work, k: int, how: tuple[int, bool]
+) -> None:
+    """Put the lanes in which something happens in the place of what is there without.
+
+    ``how``: the lanes eliminated anew, and whether there are currents that no voltage drives.
+    """
+    demand, fed = how
+    for lane in range(WIDTH):
+        if wide.busy[k] >> lane & 1:
+            flags = climb_region(tree, state, wide, lane_of(lanes, lane), k, (lane, fed))
+            if demand >> lane & 1:
+                wide.flags[lane] |= flags
 
 
 @compiled
@@ -136,70 +175,70 @@ def in_lanes(shunt: Matrix) -> Matrix:
 
 
 @compiled
-def climb_lone(tree: Tree, wide: Wide, k: int, a: int, full: bool, fed: bool) -> None:
-    """Past an edge, or a leap, that has a single phase."""
-    q = wide.leap[k]
-    if full:
-        y = load_entry(wide.y, k, 4 * a)
-        if q < 0:
-            f = reciprocal(1.0 + tree.z_ohm[k, a, a] * y)
-            w = y * f
-        else:
-            chain = tree.leap_chain[q]
-            f = reciprocal(1.0 + chain[1, a, a] * y) * chain[0, a, a]
-            w = chain[0, a, a] * (y * f) + chain[2, a, a]
-        store_entry(wide.f, k, 4 * a, f)
-        store_entry(wide.w, k, 4 * a, w)
-    if fed:
-        drawn = load_entry(wide.y_j, k, a)
-        store_entry(wide.x_j, k, a, load_entry(wide.f, k, 4 * a) * drawn)
-        if q >= 0:
-            z = tree.leap_chain[q, 1, a, a]
-            own = reciprocal(1.0 + z * load_entry(wide.y, k, 4 * a))
-            store_entry(wide.h_j, k, a, -(own * (z * drawn)))
+def climb_lone(tree: Tree, wide: Wide, k: int, a: int) -> complex:
+    """Past an edge, or a leap, that has a single phase; returns W."""
+    y, q = load_entry(wide.y, k, 4 * a), wide.leap[k]
+    if q < 0:
+        f = reciprocal(1.0 + tree.z_ohm[k, a, a] * y)
+        w = y * f
+    else:
+        chain = tree.leap_chain[q]
+        f = reciprocal(1.0 + chain[1, a, a] * y) * chain[0, a, a]
+        w = chain[0, a, a] * (y * f) + chain[2, a, a]
+    store_entry(wide.f, k, 4 * a, f)
+    return w
 
 
 @compiled
-def climb_whole(tree: Tree, wide: Wide, k: int, full: bool, fed: bool) -> None:
-    """Past an edge, or a leap, of several phases, and what stands at its upper end.
+def carry_lone(tree: Tree, wide: Wide, k: int, a: int) -> complex:
+    """What is seen above such an edge of a current drawn below it."""
+    drawn, q = load_entry(wide.y_j, k, a), wide.leap[k]
+    if q >= 0:
+        z = tree.leap_chain[q, 1, a, a]
+        own = reciprocal(1.0 + z * load_entry(wide.y, k, 4 * a))
+        store_entry(wide.h_j, k, a, -(own * (z * drawn)))
+    return load_entry(wide.f, k, 4 * a) * drawn
 
-    A current drawn below is seen from above as F' of it: what is passive is reciprocal.
+
+@compiled
+def climb_whole(tree: Tree, wide: Wide, k: int) -> Matrix:
+    """Past an edge, or a leap, of several phases, and what stands at its upper end; returns W."""
+    y, q = load_matrix(wide.y, k), wide.leap[k]
+    if q < 0:
+        f, w = up(y, load(tree.z_ohm, k))
+    else:
+        chain = tree.leap_chain[q]
+        f, _ = up(y, load(chain, 1))
+        f = product(f, load(chain, 0))
+        w = add(product(transposed(load(chain, 0)), product(y, f)), load(chain, 2))
+    if tree.regulator[k] >= 0 or tree.transformer[k] >= 0:
+        t = turn_of(tree, wide, k)
+        f, w = product(f, t), product(transposed(t), product(w, t))
+    store_matrix(wide.f, k, f)
+    return w
+
+
+@compiled
+def carry_whole(tree: Tree, wide: Wide, k: int) -> Vector:
+    """What is seen above such an edge of a current drawn below it.
+
+    It is F' of it where nothing has to be noted: what is passive is reciprocal.
     """
-    turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
-    if full:
-        y, q = load_matrix(wide.y, k), wide.leap[k]
-        if q < 0:
-            f, w = up(y, load(tree.z_ohm, k))
-        else:
-            chain = tree.leap_chain[q]
-            f, _ = up(y, load(chain, 1))
-            f = product(f, load(chain, 0))
-            w = product(transposed(load(chain, 0)), product(y, f))
-            w = add(w, load(chain, 2))
-        if turned:
-            t = turn_of(tree, wide, k)
-            f, w = product(f, t), product(transposed(t), product(w, t))
-        store_matrix(wide.f, k, f)
-        store_matrix(wide.w, k, w)
-    if fed:
-        drawn = load_triple(wide.y_j, k)
-        if wide.keeps[k]:
-            drawn = keep_ahead(tree, wide, k, drawn, turned)
-        else:
-            drawn = times(transposed(load_matrix(wide.f, k)), drawn)
-        store_triple(wide.x_j, k, drawn)
+    if wide.keeps[k]:
+        return keep_ahead(tree, wide, k)
+    return times(transposed(load_matrix(wide.f, k)), load_triple(wide.y_j, k))
 
 
 @compiled
-def keep_ahead(tree: Tree, wide: Wide, k: int, drawn: Vector, turned: bool) -> Vector:
+def keep_ahead(tree: Tree, wide: Wide, k: int) -> Vector:
     """Note what a current drawn below makes of the voltage there; returns what is seen of it.
 
-    Where F has T in it, that of the impedance alone is made anew.
+    F may have T in it; that of the impedance alone is made anew.
     """
-    y, f, q = load_matrix(wide.y, k), load_matrix(wide.f, k), wide.leap[k]
+    turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
+    y, drawn, q = load_matrix(wide.y, k), load_triple(wide.y_j, k), wide.leap[k]
     z = load(tree.z_ohm, k) if q < 0 else load(tree.leap_chain[q], 1)
-    if turned or q >= 0:
-        f = inverse(plus_diagonal(product(z, y), (1 + 0j, 1 + 0j, 1 + 0j)))
+    f, _ = up(y, z)
     ahead = minus(times(f, times(z, drawn)))
     store_triple(wide.h_j, k, ahead)
     drawn = plus(drawn, times(y, ahead))
@@ -211,8 +250,10 @@ def keep_ahead(tree: Tree, wide: Wide, k: int, drawn: Vector, turned: bool) -> V
 
 
 @compiled
-def climb_loose(tree: Tree, wide: Wide, k: int, demand: int) -> None:
+def climb_loose(tree: Tree, wide: Wide, k: int, demand: int, fed: bool) -> None:
     """Past an edge that leaves modes loose at its lower end, as ``breaks.free_modes`` does."""
+    if not fed:
+        store_triple(wide.y_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
     w, x = load_matrix(wide.y, k), load_triple(wide.y_j, k)
     p, h, z = in_lanes(IDENTITY), times(in_lanes(ZERO), x), load(tree.z_ohm, k)
     limit = splat(NOTHING_S**2)
@@ -264,13 +305,14 @@ def turn_of(tree: Tree, wide: Wide, k: int) -> Matrix:
 
 @compiled
 def climb_region(
-    tree: Tree, state: State, wide: Wide, work: Work, k: int, where: tuple[int, int, bool]
+    tree: Tree, state: State, wide: Wide, work: Work, k: int, where: tuple[int, bool]
 ) -> int:
     """One lane past the region at node k, edge by edge; returns flags.
 
-    ``where`` is the lane, its scenario, and whether there are currents that no voltage drives.
+    ``where`` is the lane, and whether there are currents that no voltage drives.
     """
-    lane, s, fed = where
+    lane, fed = where
+    s = wide.scenario[lane]
     top, q = wide.above[k], wide.leap[k]
     twig = wide.visit[k] == TWIG
     if not twig:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 from ...lanes import WIDTH
-from ...states import Tree, Work, workspace
+from ...states import Probes, Tree, Work, workspace
 from .rows import Stack
 
 __all__ = ["ALL", "LEAP", "PASSED", "PLAIN", "TWIG", "Wide", "lane_of", "wide_workspace"]
@@ -36,6 +36,7 @@ class Wide(NamedTuple):
     above: Int  #: (B,) the node above that is not passed by; B, the EMF's row, for node 0
     place: Int  #: (Q,) the node at which a leap is visited
     loose: NDArray[np.bool_]  #: (B,) the edge leaves modes loose
+    kept: NDArray[np.bool_]  #: (B,) W and X are looked at
     keeps: NDArray[np.bool_]  #: (B,) what currents make of the voltage is noted on the way up
     busy: Int  #: (B,) bits of the lanes in which something happens in the region there
     scenario: Int  #: (WIDTH,) which one each lane has
@@ -63,7 +64,7 @@ class Wide(NamedTuple):
     history: NDArray[np.float64]  #: (3, N, WIDTH)
 
 
-def wide_workspace(tree: Tree) -> tuple[Wide, Work]:
+def wide_workspace(tree: Tree, probes: Probes) -> tuple[Wide, Work]:
     """Scratch in lanes, and that of ``workspace`` with an axis of lanes before all others."""
     nodes, units, branches = tree.parent.size, tree.unit_node.size, tree.branch_node.size
     windings = 4 * (units + 1) + branches
@@ -83,6 +84,7 @@ def wide_workspace(tree: Tree) -> tuple[Wide, Work]:
         above=above,
         place=place,
         loose=loose,
+        kept=_kept(tree, probes, loose),
         keeps=_keeping(tree, loose),
         busy=np.zeros(nodes, np.int64),
         scenario=np.zeros(WIDTH, np.int64),
@@ -109,6 +111,14 @@ def wide_workspace(tree: Tree) -> tuple[Wide, Work]:
         winding_v_pu=_aligned(windings),
         history=_aligned(3, windings),
     ), Work._make(np.zeros((WIDTH, *part.shape), part.dtype) for part in one)
+
+
+def _kept(tree: Tree, probes: Probes, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Edges at probes, that of the source, and those that leave modes loose."""
+    kept = loose.copy()
+    kept[0] = True
+    kept[probes.i_edge] = True
+    return kept
 
 
 def _keeping(tree: Tree, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
