@@ -136,7 +136,9 @@ def solve(
     answer = new_answer(network, probes, scenarios)
     answer.winding_v_pu[:] = 1.0 if start is None else start
     order = np.lexsort((state.far_node, state.edge))
-    solve_wide(tree, state, probes, *wide_workspace(tree, probes), answer, order, *limits)
+    solve_wide(
+        tree, state, probes, wide_workspace(tree, probes), workspace(tree), answer, order, *limits
+    )
     return answer
 
 

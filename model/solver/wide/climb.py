@@ -1,58 +1,53 @@
-"""Up the ladder in lanes; a region where something happens is climbed lane by lane."""
+"""Up the ladder in lanes, and apart from it the regions where something happens."""
 
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import WIDTH, bits_of, joined, larger, load_real, select, splat
-from ...states import UNEARTHED, State, Tree, Work
-from ..breaks import NOTHING_S, SINGULAR, squared
-from ..ladder import climb_edge
+from ...lanes import WIDTH, mask_of
+from ...states import Tree
 from ..matrix3 import (
-    IDENTITY,
     ZERO,
     Matrix,
     Vector,
     add,
     load,
     minus,
-    outer,
     plus,
     product,
     reciprocal,
-    store,
-    store_vector,
+    scaled,
     times,
 )
 from ..series import up
 from ..turns import transposed
+from .event import climb_event, event_lanes, event_share, free_modes
 from .rows import (
     add_matrix,
     add_vector,
+    chosen,
+    chosen_vector,
+    in_lanes,
     load_entry,
     load_matrix,
     load_triple,
-    put_lane,
-    put_lane_vector,
     store_entry,
     store_matrix,
     store_triple,
-    take_lane,
-    take_lane_vector,
 )
-from .work import PASSED, TWIG, Wide, lane_of
+from .turns import turn_of, turned
+from .work import ALL, PASSED, TWIG, Wide
 
-__all__ = ["climb", "mark_regions", "turn_of"]
+__all__ = ["climb", "mark_regions"]
 
 
 @compiled
-def mark_regions(tree: Tree, state: State, wide: Wide) -> None:
+def mark_regions(tree: Tree, wide: Wide) -> None:
     """Note in ``busy`` where something happens, and in which lanes."""
     busy = wide.busy
     for k in range(busy.size):
         busy[k] = 0
     for lane in range(WIDTH):
-        s = wide.scenario[lane]
-        edge, far = state.edge[s], state.far_node[s]
+        edge, far = wide.edge[lane], wide.far[lane]
         if edge >= 0:
             q = max(tree.passed[edge], tree.leap[edge])
             busy[wide.place[q] if q >= 0 else edge] |= 1 << lane
@@ -61,13 +56,11 @@ def mark_regions(tree: Tree, state: State, wide: Wide) -> None:
 
 
 @compiled
-def climb(tree: Tree, state: State, wide: Wide, lanes: Work, how: tuple[int, bool, bool]) -> None:
+def climb(tree: Tree, wide: Wide, full: bool, fed: bool, floor_pu: float) -> None:
     """Eliminate every node from the leaves to the source, or only carry currents up.
 
-    ``how``: the lanes eliminated anew, whether there are any, and whether there are currents
-    that no voltage drives.
+    ``full``: eliminate; ``fed``: there are currents that no voltage drives.
     """
-    demand, full, fed = how
     for k in range(wide.visit.size - 1, -1, -1):
         if wide.visit[k] == PASSED:
             continue
@@ -83,18 +76,53 @@ def climb(tree: Tree, state: State, wide: Wide, lanes: Work, how: tuple[int, boo
             if fed:
                 put_drawn_entry(wide, k, a, carry_lone(tree, wide, k, a))
         elif wide.loose[k]:
-            climb_loose(tree, wide, k, demand, fed)
+            climb_loose(tree, wide, k, fed)
         else:
             if full:
                 put_matrix(wide, k, climb_whole(tree, wide, k))
             if fed:
                 put_drawn(wide, k, carry_whole(tree, wide, k))
         if is_kept(wide, k):
-            climb_regions(tree, state, wide, lanes, k, (demand, fed))
+            if wide.busy[k]:
+                climb_region(tree, wide, k, full, fed, floor_pu)
             if k and full:
                 add_matrix(wide.y, above, load_matrix(wide.w, k))
             if k and fed:
                 add_vector(wide.y_j, above, load_triple(wide.x_j, k))
+
+
+@compiled
+def climb_region(tree: Tree, wide: Wide, k: int, full: bool, fed: bool, floor_pu: float) -> None:
+    """Take the region at node k apart for the lanes in which something happens there."""
+    q, above, own = wide.leap[k], wide.above[k], mask_of(wide.busy[k])
+    store_matrix(wide.top, 0, in_lanes(ZERO))
+    store_matrix(wide.top, 1, in_lanes(ZERO))
+    store_triple(wide.top_j, 0, times(in_lanes(ZERO), (0j, 0j, 0j)))
+    first, last = (0, 1) if q < 0 else (tree.region_from[q], tree.region_from[q + 1])
+    for at in range(first, last):
+        n = k if q < 0 else tree.region_node[at]
+        bits, parent = event_lanes(wide, n), tree.parent[n]
+        drawn = times(in_lanes(ZERO), (0j, 0j, 0j))
+        if fed:
+            drawn = load_triple(wide.y_j, n)
+        w, drawn = climb_event(tree, wide, n, bits, drawn, floor_pu)
+        less = in_lanes(ZERO)
+        if tree.charged:
+            # the node above holds half of the whole edge's
+            share = event_share(wide, bits, 1.0)
+            less = scaled(load(tree.end_y_s, n), share - 1.0)
+        if parent == above:
+            add_matrix(wide.top, 0, w)
+            add_matrix(wide.top, 1, less)
+            add_vector(wide.top_j, 0, drawn)
+        else:
+            add_matrix(wide.y, parent, add(w, less))
+            add_vector(wide.y_j, parent, drawn)
+    store_matrix(wide.w, k, chosen(own, load_matrix(wide.top, 0), load_matrix(wide.w, k)))
+    drawn = chosen_vector(own, load_triple(wide.top_j, 0), load_triple(wide.x_j, k))
+    store_triple(wide.x_j, k, drawn)
+    if full and tree.charged:
+        add_matrix(wide.y, above, chosen(own, load_matrix(wide.top, 1), ZERO))
 
 
 @compiled
@@ -142,39 +170,6 @@ def put_drawn_entry(wide: Wide, k: int, a: int, drawn: complex) -> None:
 
 
 @compiled
-def climb_regions(
-    tree: Tree, state: State, wide: Wide, lanes: Work, k: int, how: tuple[int, bool]
-) -> None:
-    """Put the lanes in which something happens in the place of what is there without.
-
-    ``how``: the lanes eliminated anew, and whether there are currents that no voltage drives.
-    """
-    demand, fed = how
-    for lane in range(WIDTH):
-        if wide.busy[k] >> lane & 1:
-            flags = climb_region(tree, state, wide, lane_of(lanes, lane), k, (lane, fed))
-            if demand >> lane & 1:
-                wide.flags[lane] |= flags
-
-
-@compiled
-def in_lanes(shunt: Matrix) -> Matrix:
-    """The same in every lane."""
-    one = joined(splat(1.0), splat(0.0))
-    return (
-        one * shunt[0],
-        one * shunt[1],
-        one * shunt[2],
-        one * shunt[3],
-        one * shunt[4],
-        one * shunt[5],
-        one * shunt[6],
-        one * shunt[7],
-        one * shunt[8],
-    )
-
-
-@compiled
 def climb_lone(tree: Tree, wide: Wide, k: int, a: int) -> complex:
     """Past an edge, or a leap, that has a single phase; returns W."""
     y, q = load_entry(wide.y, k, 4 * a), wide.leap[k]
@@ -211,7 +206,7 @@ def climb_whole(tree: Tree, wide: Wide, k: int) -> Matrix:
         f, _ = up(y, load(chain, 1))
         f = product(f, load(chain, 0))
         w = add(product(transposed(load(chain, 0)), product(y, f)), load(chain, 2))
-    if tree.regulator[k] >= 0 or tree.transformer[k] >= 0:
+    if q < 0 and turned(tree, k):
         t = turn_of(tree, wide, k)
         f, w = product(f, t), product(transposed(t), product(w, t))
     store_matrix(wide.f, k, f)
@@ -235,7 +230,6 @@ def keep_ahead(tree: Tree, wide: Wide, k: int) -> Vector:
 
     F may have T in it; that of the impedance alone is made anew.
     """
-    turned = tree.regulator[k] >= 0 or tree.transformer[k] >= 0
     y, drawn, q = load_matrix(wide.y, k), load_triple(wide.y_j, k), wide.leap[k]
     z = load(tree.z_ohm, k) if q < 0 else load(tree.leap_chain[q], 1)
     f, _ = up(y, z)
@@ -244,39 +238,24 @@ def keep_ahead(tree: Tree, wide: Wide, k: int) -> Vector:
     drawn = plus(drawn, times(y, ahead))
     if q >= 0:
         return times(transposed(load(tree.leap_chain[q], 0)), drawn)
-    if turned:
+    if turned(tree, k):
         drawn = times(transposed(turn_of(tree, wide, k)), drawn)
     return drawn
 
 
 @compiled
-def climb_loose(tree: Tree, wide: Wide, k: int, demand: int, fed: bool) -> None:
-    """Past an edge that leaves modes loose at its lower end, as ``breaks.free_modes`` does."""
+def climb_loose(tree: Tree, wide: Wide, k: int, fed: bool) -> None:
+    """Past an edge that leaves modes loose at its lower end."""
     if not fed:
         store_triple(wide.y_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
-    w, x = load_matrix(wide.y, k), load_triple(wide.y_j, k)
-    p, h, z = in_lanes(IDENTITY), times(in_lanes(ZERO), x), load(tree.z_ohm, k)
-    limit = splat(NOTHING_S**2)
-    for i in range(9):
-        limit = larger(limit, SINGULAR**2 * squared(load_entry(wide.y, k, i)))
-    for n in range(tree.loose_from[k], tree.loose_from[k + 1]):
-        e = (tree.loose[n, 0], tree.loose[n, 1], tree.loose[n, 2])
-        down, own, ahead = times(w, e), times(transposed(w), e), times(p, e)
-        driving = e[0] * down[0] + e[1] * down[1] + e[2] * down[2]
-        free = squared(driving) <= limit
-        for lane in range(WIDTH):
-            if bits_of(free) & demand & (1 << lane):
-                wide.flags[lane] |= UNEARTHED
-        scale = select(free, 0j, -reciprocal(select(free, 1 + 0j, driving)))
-        drawn = scale * (e[0] * x[0] + e[1] * x[1] + e[2] * x[2])
-        w, p = add(w, outer(down, own, scale)), add(p, outer(ahead, own, scale))
-        x = plus(x, (drawn * down[0], drawn * down[1], drawn * down[2]))
-        h = plus(h, (drawn * ahead[0], drawn * ahead[1], drawn * ahead[2]))
+    below = load_matrix(wide.y, k), load_triple(wide.y_j, k)
+    w, p, x, h = free_modes(tree, wide, k, below, ALL)
+    z = load(tree.z_ohm, k)
     f, seen = up(w, z)
     more = minus(times(f, times(z, x)))
     x, h = plus(x, times(w, more)), plus(h, times(p, more))
     f = product(p, f)
-    if tree.regulator[k] >= 0 or tree.transformer[k] >= 0:
+    if turned(tree, k):
         t = turn_of(tree, wide, k)
         back = transposed(t)
         f, seen, x = product(f, t), product(back, product(seen, t)), times(back, x)
@@ -284,51 +263,3 @@ def climb_loose(tree: Tree, wide: Wide, k: int, demand: int, fed: bool) -> None:
     store_matrix(wide.w, k, seen)
     store_triple(wide.h_j, k, h)
     store_triple(wide.x_j, k, x)
-
-
-@compiled
-def turn_of(tree: Tree, wide: Wide, k: int) -> Matrix:
-    """T of what stands at the upper end of edge k, as ``turns.turn_of``."""
-    row = tree.regulator[k]
-    if row < 0:
-        return in_lanes(load(tree.turn, tree.transformer[k]))
-    t, reference = wide.turn, tree.reference
-    store_matrix(t, 0, in_lanes(IDENTITY))
-    for i in range(3):
-        more = load_real(wide.ratio, (row, i, 0)) - 1.0
-        store_entry(t, 0, 4 * i, load_entry(t, 0, 4 * i) + more)
-        if reference[row, i] >= 0:
-            across = 3 * i + reference[row, i]
-            store_entry(t, 0, across, load_entry(t, 0, across) - more)
-    return load_matrix(t, 0)
-
-
-@compiled
-def climb_region(
-    tree: Tree, state: State, wide: Wide, work: Work, k: int, where: tuple[int, bool]
-) -> int:
-    """One lane past the region at node k, edge by edge; returns flags.
-
-    ``where`` is the lane, and whether there are currents that no voltage drives.
-    """
-    lane, fed = where
-    s = wide.scenario[lane]
-    top, q = wide.above[k], wide.leap[k]
-    twig = wide.visit[k] == TWIG
-    if not twig:
-        take_lane(wide.y, k, lane, work.y, k)
-        if fed:
-            take_lane_vector(wide.y_j, k, lane, work.y_j, k)
-        else:
-            store_vector(work.y_j, k, (0j, 0j, 0j))
-    store(work.y, top, ZERO)
-    store_vector(work.y_j, top, (0j, 0j, 0j))
-    flags = 0
-    if q < 0:
-        flags = climb_edge(tree, state, work, k, s, fed)
-    else:
-        for n in range(tree.region_from[q], tree.region_from[q + 1]):
-            flags |= climb_edge(tree, state, work, tree.region_node[n], s, fed)
-    put_lane(wide.w, k, lane, work.y, top)
-    put_lane_vector(wide.x_j, k, lane, work.y_j, top)
-    return flags

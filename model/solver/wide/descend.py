@@ -3,110 +3,142 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import WIDTH, joined, splat
-from ...states import State, Tree, Work
-from ..ladder import descend_edge, neutral_shift
-from ..matrix3 import Vector, load, load_vector, minus, plus, store_vector, times
+from ...lanes import bits_of, joined, larger, mask_of, select, splat
+from ...states import Tree
+from ..breaks import FLOATING, NOTHING_S, SINGULAR, squared
+from ..matrix3 import (
+    ZERO,
+    Vector,
+    column_sums,
+    load,
+    minus,
+    plus,
+    reciprocal,
+    scaled,
+    times,
+)
+from .event import descend_event, event_lanes, event_share, note
 from .rows import (
+    Stack,
+    chosen_vector,
+    in_lanes,
     load_entry,
     load_matrix,
     load_triple,
-    put_lane_vector,
     store_entry,
     store_triple,
-    take_lane,
-    take_lane_vector,
 )
-from .work import PASSED, TWIG, Wide, lane_of
+from .turns import turned
+from .work import PASSED, TWIG, Wide
 
 __all__ = ["descend", "lift_neutrals", "probe_current"]
 
 
 @compiled
-def lift_neutrals(tree: Tree, wide: Wide, lanes: Work, fed: bool) -> None:
-    """Shift every lane's EMF by the neutral's voltage."""
+def lift_neutrals(tree: Tree, wide: Wide, fed: bool) -> None:
+    """Shift every lane's EMF by the neutral's voltage, as ``ladder.neutral_shift``."""
     last = wide.y.shape[0]
-    for lane in range(WIDTH):
-        work = lane_of(lanes, lane)
-        take_lane(wide.w, 0, lane, work.w, 0)
-        store_vector(work.x_j, 0, (0j, 0j, 0j))
-        if fed:
-            take_lane_vector(wide.x_j, 0, lane, work.x_j, 0)
-        take_lane_vector(wide.v, last, lane, work.v, last)
-        flags, emf = neutral_shift(
-            load(work.w, 0), load_vector(work.v, last), load_vector(work.x_j, 0), tree.neutral_y_s
-        )
-        store_vector(work.v, last, emf)
-        put_lane_vector(wide.v, last, lane, work.v, last)
-        wide.flags[lane] |= flags
+    w, emf = load_matrix(wide.w, 0), load_triple(wide.v, last)
+    drawn = times(w, emf)
+    if fed:
+        drawn = plus(drawn, load_triple(wide.x_j, 0))
+    sums = column_sums(w)
+    total = sums[0] + sums[1] + sums[2] + tree.neutral_y_s
+    limit = splat(NOTHING_S**2)
+    for i in range(9):
+        limit = larger(limit, SINGULAR**2 * squared(load_entry(wide.w, 0, i)))
+    free = squared(total) <= limit
+    note(wide, bits_of(free), FLOATING)
+    shift = -(drawn[0] + drawn[1] + drawn[2]) * reciprocal(select(free, 1 + 0j, total))
+    shift = select(free, 0j, shift)
+    store_triple(wide.v, last, plus(emf, (shift, shift, shift)))
 
 
 @compiled
-def descend(tree: Tree, state: State, wide: Wide, lanes: Work, fed: bool) -> None:
+def descend(tree: Tree, wide: Wide, fed: bool) -> None:
     """Voltages from the source to the leaves, those of nodes passed by only in busy regions."""
-    lone, visits, v_all = tree.lone_phase, wide.visit, wide.v
-    for k in range(visits.size):
-        visit = visits[k]
-        if visit == PASSED:
+    for k in range(wide.visit.size):
+        if wide.visit[k] == PASSED:
             continue
-        a, busy, above = lone[k], wide.busy[k], wide.above[k]
-        if visit != TWIG:
+        a = tree.lone_phase[k]
+        if wide.visit[k] != TWIG:
             if a >= 0:
-                v1, kept = load_entry(v_all, above, a), wide.leap[k] >= 0
-                if fed and not kept:
-                    v1 = v1 - tree.z_ohm[k, a, a] * load_entry(wide.y_j, k, a)
-                v1 = load_entry(wide.f, k, 4 * a) * v1
-                if fed and kept:
-                    v1 = v1 + load_entry(wide.h_j, k, a)
-                store_entry(v_all, k, a, v1)
+                descend_lone(tree, wide, k, a, fed)
             else:
-                v = load_triple(v_all, above)
-                if fed and not wide.keeps[k]:
-                    lost = times(load(tree.z_ohm, k), load_triple(wide.y_j, k))
-                    v = plus(v, minus(lost))
-                v = times(load_matrix(wide.f, k), v)
-                if fed and wide.keeps[k]:
-                    v = plus(v, load_triple(wide.h_j, k))
-                store_triple(v_all, k, v)
-                if tree.node_phases[k] != 7:
-                    keep_phases(wide, k, tree.node_phases[k])
-        if busy:
-            for lane in range(WIDTH):
-                if busy >> lane & 1:
-                    work = lane_of(lanes, lane)
-                    descend_region(tree, state, wide, work, k, (lane, wide.scenario[lane], fed))
+                descend_whole(tree, wide, k, fed)
+        if wide.busy[k]:
+            descend_region(tree, wide, k)
 
 
 @compiled
-def keep_phases(wide: Wide, k: int, phases: int) -> None:
-    """Zero for phases that node k does not have."""
+def descend_lone(tree: Tree, wide: Wide, k: int, a: int, fed: bool) -> None:
+    """The voltage below an edge, or a leap, that has a single phase."""
+    v1, noted = load_entry(wide.v, wide.above[k], a), wide.leap[k] >= 0
+    if fed and not noted:
+        v1 = v1 - tree.z_ohm[k, a, a] * load_entry(wide.y_j, k, a)
+    v1 = load_entry(wide.f, k, 4 * a) * v1
+    if fed and noted:
+        v1 = v1 + load_entry(wide.h_j, k, a)
+    store_entry(wide.v, k, a, v1)
+
+
+@compiled
+def descend_whole(tree: Tree, wide: Wide, k: int, fed: bool) -> None:
+    """The voltage below an edge, or a leap, of several phases."""
+    v = load_triple(wide.v, wide.above[k])
+    if fed and not wide.keeps[k]:
+        v = plus(v, minus(times(load(tree.z_ohm, k), load_triple(wide.y_j, k))))
+    v = times(load_matrix(wide.f, k), v)
+    if fed and wide.keeps[k]:
+        v = plus(v, load_triple(wide.h_j, k))
+    store_triple(wide.v, k, v)
+    keep_phases(wide.v, k, tree.node_phases[k])
+
+
+@compiled
+def keep_phases(stack: Stack, k: int, phases: int) -> None:
+    """Zero in row k for phases that are not there."""
+    if phases == 7:
+        return
     for i in range(3):
         if not phases & (1 << i):
-            store_entry(wide.v, k, i, joined(splat(0.0), splat(0.0)))
+            store_entry(stack, k, i, joined(splat(0.0), splat(0.0)))
 
 
 @compiled
-def descend_region(
-    tree: Tree, state: State, wide: Wide, work: Work, k: int, where: tuple[int, int, bool]
-) -> None:
-    """One lane down the region at node k, edge by edge."""
-    lane, s, fed = where
-    top, q = wide.above[k], wide.leap[k]
-    take_lane_vector(wide.v, top, lane, work.v, top)
-    if q < 0:
-        descend_edge(tree, state, work, k, s, fed)
-    else:
-        for n in range(tree.region_from[q + 1] - 1, tree.region_from[q] - 1, -1):
-            descend_edge(tree, state, work, tree.region_node[n], s, fed)
+def descend_region(tree: Tree, wide: Wide, k: int) -> None:
+    """The lanes in which something happens down the region at node k, edge by edge."""
+    q, own, v_all = wide.leap[k], mask_of(wide.busy[k]), wide.v
+    generic = load_triple(v_all, k)
+    first, last = (0, 1) if q < 0 else (tree.region_from[q], tree.region_from[q + 1])
+    for at in range(last - 1, first - 1, -1):
+        n = k if q < 0 else tree.region_node[at]
+        bits, above = event_lanes(wide, n), load_triple(v_all, tree.parent[n])
+        store_triple(v_all, n, descend_event(wide, n, bits, above))
+        keep_phases(v_all, n, tree.node_phases[n])
+        if bits:
+            keep_stubs(wide, bits, tree.phases[n])
     if wide.visit[k] != TWIG:
-        put_lane_vector(wide.v, k, lane, work.v, k)
+        store_triple(v_all, k, chosen_vector(own, load_triple(v_all, k), generic))
+
+
+@compiled
+def keep_stubs(wide: Wide, bits: int, phases: int) -> None:
+    """Zero at the event node of these lanes for phases that its edge does not have."""
+    own = mask_of(bits)
+    for i in range(3):
+        if not phases & (1 << i):
+            for side in range(2):
+                stub = load_entry(wide.stub, side, i)
+                store_entry(wide.stub, side, i, select(own, 0j, stub))
 
 
 @compiled
 def probe_current(tree: Tree, wide: Wide, k: int, below: bool, fed: bool) -> Vector:
-    """Current from above into an edge on which nothing happens, or out of its lower end."""
-    v_all, upper = wide.v, wide.above[k]
-    if below and (tree.regulator[k] >= 0 or tree.transformer[k] >= 0):
+    """Current from above into an edge, or out of its lower end."""
+    v_all, upper, bits = wide.v, wide.above[k], event_lanes(wide, k)
+    own, nothing = mask_of(bits), times(in_lanes(ZERO), (0j, 0j, 0j))
+    if below and turned(tree, k):
         current = times(load_matrix(wide.y, k), load_triple(v_all, k))
         if fed:
             current = plus(current, load_triple(wide.y_j, k))
@@ -114,7 +146,14 @@ def probe_current(tree: Tree, wide: Wide, k: int, below: bool, fed: bool) -> Vec
         current = times(load_matrix(wide.w, k), load_triple(v_all, upper))
         if fed:
             current = plus(current, load_triple(wide.x_j, k))
+        if below and bits:
+            for side in range(2):
+                shunts, stub = load_matrix(wide.event_y, side), load_triple(wide.stub, side)
+                current = plus(current, chosen_vector(own, minus(times(shunts, stub)), nothing))
     if tree.charged and k:
-        charging = times(load(tree.end_y_s, k), load_triple(v_all, k if below else upper))
+        share = event_share(wide, bits, 0.0 if below else 1.0)
+        part = 1.0 - share if below else share
+        half = scaled(load(tree.end_y_s, k), part)
+        charging = times(half, load_triple(v_all, k if below else upper))
         current = plus(current, minus(charging) if below else charging)
     return current

@@ -1,4 +1,4 @@
-"""Matrices and vectors of lanes in memory, and one lane of them as ordinary numbers."""
+"""Matrices and vectors of lanes in memory."""
 
 from __future__ import annotations
 
@@ -6,30 +6,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ...lanes import joined, load_real, select, store_real
+from ...lanes import joined, load_real, select, splat, store_real
 from ..matrix3 import Matrix, Vector
 
 __all__ = [
     "Stack",
-    "add_lane",
-    "add_lane_vector",
+    "add_entry",
+    "add_in_lane",
     "add_matrix",
     "add_vector",
     "chosen",
+    "chosen_vector",
+    "in_lanes",
     "load_entry",
     "load_matrix",
     "load_triple",
-    "put_lane",
-    "put_lane_vector",
+    "put_in_lane",
     "store_entry",
     "store_matrix",
     "store_triple",
-    "take_lane",
-    "take_lane_vector",
 ]
 
 Stack = NDArray[np.float64]  #: (n, 2 m, WIDTH) of n rows of m complex numbers
-Complex = NDArray[np.complex128]
 
 
 @compiled
@@ -128,46 +126,47 @@ def chosen(mask: int, one: Matrix, other: Matrix) -> Matrix:
 
 
 @compiled
-def take_lane(stack: Stack, k: int, lane: int, out: Complex, n: int) -> None:
-    """One lane of matrix k, into matrix n of ``out`` (m, 3, 3)."""
-    for i in range(9):
-        out[n, i // 3, i % 3] = complex(stack[k, 2 * i, lane], stack[k, 2 * i + 1, lane])
+def chosen_vector(mask: int, one: Vector, other: Vector) -> Vector:
+    """Vectors by lanes."""
+    return (
+        select(mask, one[0], other[0]),
+        select(mask, one[1], other[1]),
+        select(mask, one[2], other[2]),
+    )
 
 
 @compiled
-def put_lane(stack: Stack, k: int, lane: int, given: Complex, n: int) -> None:
-    """The way back."""
-    for i in range(9):
-        stack[k, 2 * i, lane] = given[n, i // 3, i % 3].real
-        stack[k, 2 * i + 1, lane] = given[n, i // 3, i % 3].imag
+def in_lanes(m: Matrix) -> Matrix:
+    """The same matrix in every lane."""
+    one = joined(splat(1.0), splat(0.0))
+    return (
+        one * m[0],
+        one * m[1],
+        one * m[2],
+        one * m[3],
+        one * m[4],
+        one * m[5],
+        one * m[6],
+        one * m[7],
+        one * m[8],
+    )
 
 
 @compiled
-def add_lane(stack: Stack, k: int, lane: int, given: Complex, n: int) -> None:
-    """Add matrix n of ``given`` to that lane."""
-    for i in range(9):
-        stack[k, 2 * i, lane] += given[n, i // 3, i % 3].real
-        stack[k, 2 * i + 1, lane] += given[n, i // 3, i % 3].imag
+def add_entry(stack: Stack, k: int, i: int, value: complex) -> None:
+    """Add to entry i of row k."""
+    store_entry(stack, k, i, load_entry(stack, k, i) + value)
 
 
 @compiled
-def take_lane_vector(stack: Stack, k: int, lane: int, out: Complex, n: int) -> None:
-    """One lane of vector k, into row n of ``out`` (m, 3)."""
-    for i in range(3):
-        out[n, i] = complex(stack[k, 2 * i, lane], stack[k, 2 * i + 1, lane])
+def add_in_lane(stack: Stack, k: int, i: int, lane: int, value: complex) -> None:
+    """Add to one lane of it."""
+    stack[k, 2 * i, lane] += value.real
+    stack[k, 2 * i + 1, lane] += value.imag
 
 
 @compiled
-def put_lane_vector(stack: Stack, k: int, lane: int, given: Complex, n: int) -> None:
-    """The way back."""
-    for i in range(3):
-        stack[k, 2 * i, lane] = given[n, i].real
-        stack[k, 2 * i + 1, lane] = given[n, i].imag
-
-
-@compiled
-def add_lane_vector(stack: Stack, k: int, lane: int, given: Complex, n: int) -> None:
-    """Add row n of ``given`` to that lane."""
-    for i in range(3):
-        stack[k, 2 * i, lane] += given[n, i].real
-        stack[k, 2 * i + 1, lane] += given[n, i].imag
+def put_in_lane(stack: Stack, k: int, i: int, lane: int, value: complex) -> None:
+    """Write one lane of it."""
+    stack[k, 2 * i, lane] = value.real
+    stack[k, 2 * i + 1, lane] = value.imag

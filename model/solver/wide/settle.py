@@ -15,7 +15,7 @@ from ...lanes import (
     square_root,
     store_real,
 )
-from ...states import State, Tree, Work
+from ...states import Tree
 from ..matrix3 import plus, times
 from ..settle import PLAIN_PASSES, SECANT_PASSES, SHORT_STEP, TINY, magnitude, positive
 from .rows import load_entry, load_matrix, load_triple
@@ -25,12 +25,10 @@ __all__ = ["see_magnitudes", "update_magnitudes"]
 
 
 @compiled
-def update_magnitudes(
-    tree: Tree, state: State, wide: Wide, lanes: Work, passes: int, tolerance_pu: float
-) -> int:
+def update_magnitudes(tree: Tree, wide: Wide, passes: int, tolerance_pu: float) -> int:
     """Move the voltages towards the solved ones; returns the bits of the lanes that settled."""
     v_pu, history = wide.winding_v_pu, wide.history
-    largest = larger(find_gaps(tree, state, wide, lanes), splat(1.0))
+    largest = larger(find_gaps(tree, wide), splat(1.0))
     change = along = across = assumed = solved = splat(0.0)
     for n in range(v_pu.shape[0]):
         gap = load_real(history, (2, n, 0))
@@ -62,9 +60,9 @@ def update_magnitudes(
 
 
 @compiled
-def see_magnitudes(tree: Tree, state: State, wide: Wide, lanes: Work, bits: int) -> None:
+def see_magnitudes(tree: Tree, wide: Wide, bits: int) -> None:
     """Take over the solved voltages in the lanes where nothing depends on them."""
-    find_gaps(tree, state, wide, lanes)
+    find_gaps(tree, wide)
     own, v_pu = mask_of(bits), wide.winding_v_pu
     for n in range(v_pu.shape[0]):
         value = load_real(v_pu, (n, 0))
@@ -73,7 +71,7 @@ def see_magnitudes(tree: Tree, state: State, wide: Wide, lanes: Work, bits: int)
 
 
 @compiled
-def find_gaps(tree: Tree, state: State, wide: Wide, lanes: Work) -> float:
+def find_gaps(tree: Tree, wide: Wide) -> float:
     """How far the solved voltages are from those assumed; returns the largest, in pu."""
     v_all, units = wide.v, tree.unit_node.size
     sourced = tree.machine_unit.size > 0
@@ -88,7 +86,7 @@ def find_gaps(tree: Tree, state: State, wide: Wide, lanes: Work) -> float:
         largest = gap_of(wide, 4 * unit + 2, v[2], over, largest)
         if sourced:
             largest = gap_of(wide, 4 * unit + 3, positive(v), over, largest)
-    largest = larger(largest, find_event_gaps(tree, state, wide, lanes))
+    largest = larger(largest, find_event_gaps(tree, wide))
     node, first, other = tree.branch_node, tree.branch_from, tree.branch_to
     at = 4 * (units + 1)
     for p in range(node.size):
@@ -108,17 +106,18 @@ def gap_of(wide: Wide, n: int, v: complex, over: float, largest: float) -> float
 
 
 @compiled
-def find_event_gaps(tree: Tree, state: State, wide: Wide, lanes: Work) -> float:
+def find_event_gaps(tree: Tree, wide: Wide) -> float:
     """The same at the upper stub of every event node."""
     v_pu, history, at = wide.winding_v_pu, wide.history, 4 * tree.unit_node.size
     for i in range(4):
         store_real(history, (2, at + i, 0), splat(0.0))
     most = splat(0.0)
     for lane in range(WIDTH):
-        edge = state.edge[wide.scenario[lane]]
+        edge = wide.edge[lane]
         if edge >= 0:
             for i in range(3):
-                size = magnitude(lanes.stub[lane, 0, i]) / tree.node_v[edge]
+                stub = complex(wide.stub[0, 2 * i, lane], wide.stub[0, 2 * i + 1, lane])
+                size = magnitude(stub) / tree.node_v[edge]
                 history[2, at + i, lane] = size - v_pu[at + i, lane]
     for i in range(3):
         gap, value = load_real(history, (2, at + i, 0)), load_real(v_pu, (at + i, 0))

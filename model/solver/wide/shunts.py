@@ -5,27 +5,27 @@ from __future__ import annotations
 from ...compiled import compiled
 from ...lanes import WIDTH, bits_of, load_real, mask_of, select, splat, store_real
 from ...states import State, Tree, Work
-from ..assemble import add_machine, add_shunt, hang_bank, set_event_shunts
+from ..assemble import add_machine, hang_bank
 from ..bank import D_YG, YG_D, YG_YG
 from ..bank_forms import delta_wye, wye_delta, wye_wye
-from ..matrix3 import ZERO, Matrix, load, store, store_vector
+from ..matrix3 import ZERO, Matrix, load, store, store_vector, times
 from .loads import load_admittance
 from .rows import (
-    add_lane,
-    add_lane_vector,
+    add_in_lane,
     add_matrix,
     chosen,
+    in_lanes,
     load_entry,
     load_matrix,
     load_triple,
-    put_lane,
-    put_lane_vector,
+    put_in_lane,
     store_entry,
     store_matrix,
+    store_triple,
 )
-from .work import ALL, Wide, lane_of
+from .work import ALL, Wide
 
-__all__ = ["find_demand", "leap_at", "set_region_shunts", "set_shunts"]
+__all__ = ["find_demand", "set_region_shunts", "set_shunts"]
 
 NEAR = 0.2  #: an admittance farther from the eliminated one than this share needs a new elimination
 
@@ -61,7 +61,7 @@ def set_shunts(
     tree: Tree,
     state: State,
     wide: Wide,
-    lanes: Work,
+    work: Work,
     how: tuple[int, bool, bool],
     floor_pu: float,
 ) -> None:
@@ -86,7 +86,7 @@ def set_shunts(
         for i in range(9):
             store_entry(y, k, i, nothing + complex(tree.shunt_s[k, i // 3, i % 3]))
     if full:
-        hang_units(tree, state, wide, lanes, floor_pu)
+        hang_units(tree, state, wide, work, floor_pu)
     renewed = mask_of(demand)
     node, first, other = tree.branch_node, tree.branch_from, tree.branch_to
     for p in range(node.size):
@@ -111,7 +111,7 @@ def set_shunts(
 
 
 @compiled
-def hang_units(tree: Tree, state: State, wide: Wide, lanes: Work, floor_pu: float) -> None:
+def hang_units(tree: Tree, state: State, wide: Wide, work: Work, floor_pu: float) -> None:
     """Every bank with its loads and machines on its node."""
     units = tree.unit_node.size
     if units == 0:
@@ -136,7 +136,7 @@ def hang_units(tree: Tree, state: State, wide: Wide, lanes: Work, floor_pu: floa
     if apart:
         for lane in range(WIDTH):
             if apart >> lane & 1:
-                hang_apart(tree, state, wide, lane_of(lanes, lane), lane, floor_pu)
+                hang_apart(tree, state, wide, work, lane, floor_pu)
 
 
 @compiled
@@ -194,69 +194,41 @@ def hang_apart(
         store(work.y, node[unit], ZERO)
         store_vector(work.y_j, node[unit], (0j, 0j, 0j))
         hang_bank(tree, work, unit, connections[unit, s])
-        add_lane(wide.y, node[unit], lane, work.y, node[unit])
-        add_lane_vector(wide.y_j, node[unit], lane, work.y_j, node[unit])
-        put_lane(wide.g, unit, lane, work.g, unit)
-        put_lane_vector(wide.g_j, unit, lane, work.g_j, unit)
-
-
-@compiled
-def set_region_shunts(
-    tree: Tree, state: State, wide: Wide, lanes: Work, full: bool, floor_pu: float
-) -> None:
-    """What happens in each lane: shunts at the event node, and at a second step's node.
-
-    Nodes that a leap passes by get theirs in the lane's own scratch; all others in ``wide``, with
-    all that is eliminated anew.
-    """
-    for lane in range(WIDTH):
-        s = wide.scenario[lane]
-        edge, far = state.edge[s], state.far_node[s]
-        if edge < 0 and far < 0:
-            continue
-        work = lane_of(lanes, lane)
-        empty_leap(tree, wide, work, edge)
-        empty_leap(tree, wide, work, far)
-        if far >= 0:
-            if tree.passed[far] < 0:
-                store(work.y, far, ZERO)
-            for i in range(3):
-                more, across = state.far_y_s[i, s], state.far_between_y_s[i, s]
-                add_shunt(work.y, far, i, more, across)
-            if full and tree.passed[far] < 0:
-                add_lane(wide.y, far, lane, work.y, far)
-        if edge < 0:
-            continue
-        upper = tree.parent[edge]
-        for node in (upper, edge):
-            if tree.passed[node] < 0:
-                store(work.y, node, ZERO)
-        at = 4 * tree.unit_node.size
+        for i in range(9):
+            row, column = i // 3, i % 3
+            add_in_lane(wide.y, node[unit], i, lane, work.y[node[unit], row, column])
+            put_in_lane(wide.g, unit, i, lane, work.g[unit, row, column])
         for i in range(3):
-            work.winding_v_pu[at + i] = wide.winding_v_pu[at + i, lane]
-        set_event_shunts(tree, state, work, s, floor_pu)
-        if full and tree.charged:
-            for node in (upper, edge):
-                if tree.passed[node] < 0:
-                    add_lane(wide.y, node, lane, work.y, node)
+            add_in_lane(wide.y_j, node[unit], i, lane, work.y_j[node[unit], i])
+            put_in_lane(wide.g_j, unit, i, lane, work.g_j[unit, i])
 
 
 @compiled
-def empty_leap(tree: Tree, wide: Wide, work: Work, node: int) -> None:
+def set_region_shunts(tree: Tree, state: State, wide: Wide, full: bool) -> None:
+    """A second step's shunts, and all on the nodes that busy leaps pass by."""
+    for lane in range(WIDTH):
+        empty_leap(tree, wide, wide.edge[lane])
+        empty_leap(tree, wide, wide.far[lane])
+    for lane in range(WIDTH):
+        far, s = wide.far[lane], wide.scenario[lane]
+        if far >= 0 and (full or tree.passed[far] >= 0):
+            for i in range(3):
+                following = (i + 1) % 3
+                earth, between = state.far_y_s[i, s], state.far_between_y_s[i, s]
+                add_in_lane(wide.y, far, 4 * i, lane, earth + between)
+                add_in_lane(wide.y, far, 4 * following, lane, between)
+                add_in_lane(wide.y, far, 3 * i + following, lane, -between)
+                add_in_lane(wide.y, far, 3 * following + i, lane, -between)
+
+
+@compiled
+def empty_leap(tree: Tree, wide: Wide, node: int) -> None:
     """The fixed shunts on the nodes of the leap that ``node`` is part of."""
-    q = leap_at(tree, node)
+    q = -1 if node < 0 else max(tree.passed[node], tree.leap[node])
     if q < 0:
         return
     for n in range(tree.region_from[q], tree.region_from[q + 1]):
         k = tree.region_node[n]
         if tree.passed[k] >= 0:
-            store(work.y, k, load(tree.shunt_s, k))
-            store_vector(work.y_j, k, (0j, 0j, 0j))
-
-
-@compiled
-def leap_at(tree: Tree, node: int) -> int:
-    """The leap that passes a node by, or else ends there; -1: none."""
-    if node < 0:
-        return -1
-    return max(tree.passed[node], tree.leap[node])
+            store_matrix(wide.y, k, in_lanes(load(tree.shunt_s, k)))
+            store_triple(wide.y_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))

@@ -8,17 +8,18 @@ from numpy.typing import NDArray
 from ...compiled import compiled, compiled_door
 from ...lanes import WIDTH, bits_of, load_real, splat, store_real
 from ...states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
-from ..ladder import edge_current, is_sourced
-from ..matrix3 import plus, store_vector, times
+from ..ladder import is_sourced
+from ..matrix3 import ZERO, plus, times
 from ..settle import is_steady, positive
 from .climb import climb, mark_regions
 from .descend import descend, lift_neutrals, probe_current
-from .rows import load_matrix, load_triple, store_triple
+from .rows import Stack, in_lanes, load_matrix, load_triple, put_in_lane, store_triple
 from .settle import see_magnitudes, update_magnitudes
 from .shunts import find_demand, set_region_shunts, set_shunts
-from .work import ALL, Wide, lane_of
+from .work import ALL, Wide
 
 Int = NDArray[np.int64]
+Complex = NDArray[np.complex128]
 
 __all__ = ["solve_wide"]
 
@@ -31,7 +32,7 @@ def solve_wide(
     state: State,
     probes: Probes,
     wide: Wide,
-    lanes: Work,
+    work: Work,
     answer: Answer,
     order: Int,
     tolerance_pu: float,
@@ -45,8 +46,8 @@ def solve_wide(
     """
     sourced = is_sourced(tree)
     for at in range(0, order.size, WIDTH):
-        linear, anew = begin(tree, state, wide, lanes, answer, order[at : at + WIDTH])
-        mark_regions(tree, state, wide)
+        linear, anew = begin(tree, state, wide, answer, order[at : at + WIDTH])
+        mark_regions(tree, wide)
         settled = passes = 0
         while settled != ALL and passes < most_passes:
             passes += 1
@@ -57,21 +58,22 @@ def solve_wide(
                 demand = ALL
             demand = (demand | anew) & ~settled
             full, fed = demand != 0, sourced or demand != ALL
+            wide.demand[0] = demand
             for lane in range(WIDTH):
                 if demand >> lane & 1:
                     wide.flags[lane] = 0
-            set_shunts(tree, state, wide, lanes, (demand, full, fed), floor_pu)
-            set_region_shunts(tree, state, wide, lanes, full, floor_pu)
-            climb(tree, state, wide, lanes, (demand, full, fed))
+            set_shunts(tree, state, wide, work, (demand, full, fed), floor_pu)
+            set_region_shunts(tree, state, wide, full)
+            climb(tree, wide, full, fed, floor_pu)
             set_emf(tree, wide)
             if tree.lifted:
-                lift_neutrals(tree, wide, lanes, fed)
-            descend(tree, state, wide, lanes, fed)
+                lift_neutrals(tree, wide, fed)
+            descend(tree, wide, fed)
             found = linear & ~settled
             if found:
-                see_magnitudes(tree, state, wide, lanes, found)
+                see_magnitudes(tree, wide, found)
             if (settled | found) != ALL:
-                more = update_magnitudes(tree, state, wide, lanes, passes, tolerance_pu)
+                more = update_magnitudes(tree, wide, passes, tolerance_pu)
                 found |= more & ~settled
             if passes == most_passes:
                 for lane in range(WIDTH):
@@ -79,14 +81,12 @@ def solve_wide(
                         wide.flags[lane] |= NOT_CONVERGED
                 found = ALL & ~settled
             if found:
-                write(tree, state, probes, wide, lanes, answer, (found, passes, fed))
+                write(tree, probes, wide, answer, (found, passes, fed))
             settled |= found
 
 
 @compiled
-def begin(
-    tree: Tree, state: State, wide: Wide, lanes: Work, answer: Answer, chosen: Int
-) -> tuple[int, int]:
+def begin(tree: Tree, state: State, wide: Wide, answer: Answer, chosen: Int) -> tuple[int, int]:
     """Put eight scenarios in lanes; returns the bits of those in which nothing follows a voltage.
 
     And of those that are eliminated in every pass: steps that follow the voltage are, and all
@@ -116,9 +116,26 @@ def begin(
         linear &= ~(int(not is_steady(state, s)) << lane)
         if state.edge[s] >= 0 and state.step_exponent[s] != 2.0:
             anew |= 1 << lane
-        store_vector(lanes.stub[lane], 0, (0j, 0j, 0j))
-        store_vector(lanes.stub[lane], 1, (0j, 0j, 0j))
+        place_event(state, wide, lane, s)
+    for side in range(2):
+        store_triple(wide.stub, side, times(in_lanes(ZERO), (0j, 0j, 0j)))
     return linear, anew
+
+
+@compiled
+def place_event(state: State, wide: Wide, lane: int, s: int) -> None:
+    """What happens in scenario s, into a lane."""
+    edge = state.edge[s]
+    wide.edge[lane], wide.far[lane] = edge, state.far_node[s]
+    wide.share[0, lane] = state.share[s]
+    wide.step_power[0, lane] = state.step_exponent[s] - 2.0
+    for i in range(3):
+        wide.opened[i] &= ~(1 << lane)
+        if edge >= 0:
+            wide.opened[i] |= (state.open_mask[s] >> i & 1) << lane
+            put_in_lane(wide.step_y, 0, i, lane, state.step_y_s[i, s])
+            put_in_lane(wide.between_y, 0, i, lane, state.between_y_s[i, s])
+            put_in_lane(wide.fallen_y, 0, i, lane, state.fallen_y_s[i, s])
 
 
 @compiled
@@ -144,13 +161,7 @@ def set_emf(tree: Tree, wide: Wide) -> None:
 
 @compiled
 def write(
-    tree: Tree,
-    state: State,
-    probes: Probes,
-    wide: Wide,
-    lanes: Work,
-    answer: Answer,
-    which: tuple[int, int, bool],
+    tree: Tree, probes: Probes, wide: Wide, answer: Answer, which: tuple[int, int, bool]
 ) -> None:
     """Put the phasors of some lanes into the answer.
 
@@ -158,42 +169,39 @@ def write(
     """
     bits, passes, fed = which
     v_node, i_edge, i_below = probes.v_node, probes.i_edge, probes.i_below
-    v, current = wide.v, wide.current
+    current, scenario = wide.current, wide.scenario
     for n in range(wide.winding_v_pu.shape[0]):
         for lane in range(WIDTH):
             if bits >> lane & 1:
-                answer.winding_v_pu[n, wide.scenario[lane]] = wide.winding_v_pu[n, lane]
+                answer.winding_v_pu[n, scenario[lane]] = wide.winding_v_pu[n, lane]
+    for n in range(v_node.size):
+        write_phasors(wide, bits, (wide.v, v_node[n]), answer.v, n)
     for n in range(i_edge.size):
         store_triple(current, 0, probe_current(tree, wide, i_edge[n], i_below[n], fed))
-        for lane in range(WIDTH):
-            if bits >> lane & 1:
-                s = wide.scenario[lane]
-                for i in range(3):
-                    answer.i[n, i, s] = complex(
-                        current[0, 2 * i, lane], current[0, 2 * i + 1, lane]
-                    )
-                if state.edge[s] == i_edge[n]:
-                    work = lane_of(lanes, lane)
-                    own = edge_current(tree, state, work, s, (i_edge[n], i_below[n], True))
-                    for i in range(3):
-                        answer.i[n, i, s] = own[i]
+        write_phasors(wide, bits, (current, 0), answer.i, n)
+    for side in range(2):
+        write_phasors(wide, bits, (wide.stub, side), answer.stub, side)
     for m in range(tree.machine_unit.size):
         unit = tree.machine_unit[m]
-        windings = times(load_matrix(wide.g, unit), load_triple(v, tree.unit_node[unit]))
+        windings = times(load_matrix(wide.g, unit), load_triple(wide.v, tree.unit_node[unit]))
         v1 = positive(plus(windings, load_triple(wide.g_j, unit)))
         store_triple(current, 0, (v1, v1, v1))
         for lane in range(WIDTH):
             if bits >> lane & 1:
-                s = wide.scenario[lane]
-                answer.machine_v1_v[m, s] = complex(current[0, 0, lane], current[0, 1, lane])
+                found = complex(current[0, 0, lane], current[0, 1, lane])
+                answer.machine_v1_v[m, scenario[lane]] = found
     for lane in range(WIDTH):
         if bits >> lane & 1:
-            s = wide.scenario[lane]
-            answer.flags[s] = wide.flags[lane]
-            answer.passes[s] = passes
-            for i in range(3):
-                answer.stub[0, i, s] = lanes.stub[lane, 0, i]
-                answer.stub[1, i, s] = lanes.stub[lane, 1, i]
-                for n in range(v_node.size):
-                    k = v_node[n]
-                    answer.v[n, i, s] = complex(v[k, 2 * i, lane], v[k, 2 * i + 1, lane])
+            answer.flags[scenario[lane]] = wide.flags[lane]
+            answer.passes[scenario[lane]] = passes
+
+
+@compiled
+def write_phasors(wide: Wide, bits: int, given: tuple[Stack, int], out: Complex, n: int) -> None:
+    """Three phases of some lanes into row n of (m, 3, S)."""
+    stack, k = given
+    for i in range(3):
+        for lane in range(WIDTH):
+            if bits >> lane & 1:
+                value = complex(stack[k, 2 * i, lane], stack[k, 2 * i + 1, lane])
+                out[n, i, wide.scenario[lane]] = value

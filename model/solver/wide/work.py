@@ -1,4 +1,4 @@
-"""Scratch space for eight scenarios: in lanes what all share, and a record of each for itself."""
+"""Scratch space for eight scenarios."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled import compiled
 from ...lanes import WIDTH
-from ...states import Probes, Tree, Work, workspace
+from ...states import Probes, Tree
 from .rows import Stack
 
-__all__ = ["ALL", "LEAP", "PASSED", "PLAIN", "TWIG", "Wide", "lane_of", "wide_workspace"]
+__all__ = ["ALL", "LEAP", "PASSED", "PLAIN", "TWIG", "Wide", "wide_workspace"]
 
 Int = NDArray[np.int64]
+Real = NDArray[np.float64]
 
 ALL = (1 << WIDTH) - 1  #: bits of all lanes
 PASSED, PLAIN, LEAP, TWIG = 0, 1, 2, 3  #: how the ladder takes a node
@@ -36,23 +36,43 @@ class Wide(NamedTuple):
     above: Int  #: (B,) the node above that is not passed by; B, the EMF's row, for node 0
     place: Int  #: (Q,) the node at which a leap is visited
     loose: NDArray[np.bool_]  #: (B,) the edge leaves modes loose
-    kept: NDArray[np.bool_]  #: (B,) W and X are looked at
+    kept: NDArray[np.bool_]  #: (B,) W and X of the edge are looked at
     keeps: NDArray[np.bool_]  #: (B,) what currents make of the voltage is noted on the way up
     busy: Int  #: (B,) bits of the lanes in which something happens in the region there
+    demand: Int  #: (1,) bits of the lanes that are eliminated anew
     scenario: Int  #: (WIDTH,) which one each lane has
     flags: Int  #: (WIDTH,)
-    load_scale: NDArray[np.float64]  #: (L, WIDTH) as in ``State``
-    exponent: NDArray[np.float64]  #: (L, WIDTH)
-    ratio: NDArray[np.float64]  #: (R, 3, WIDTH)
-    emf_pu: NDArray[np.float64]  #: (1, WIDTH)
+    edge: Int  #: (WIDTH,) of the event
+    far: Int  #: (WIDTH,) node of a second step
+    opened: Int  #: (3,) bits of the lanes in which a phase is open
+    empty: Int  #: (3,) and of those where nothing is below it
+    load_scale: Real  #: (L, WIDTH) as in ``State``
+    exponent: Real  #: (L, WIDTH)
+    ratio: Real  #: (R, 3, WIDTH)
+    emf_pu: Real  #: (1, WIDTH)
+    share: Real  #: (1, WIDTH)
+    step_power: Real  #: (1, WIDTH) of ``step_y`` beyond that of an impedance
+    step_y: Stack  #: (1, 6, WIDTH)
+    between_y: Stack  #: (1, 6, WIDTH)
+    fallen_y: Stack  #: (1, 6, WIDTH)
     y: Stack  #: (B, 18, WIDTH)
     f: Stack  #: (B, 18, WIDTH)
     w: Stack  #: (B, 18, WIDTH)
     y_j: Stack  #: (B, 6, WIDTH)
     h_j: Stack  #: (B, 6, WIDTH)
     x_j: Stack  #: (B, 6, WIDTH)
+    own_f: Stack  #: (B, 18, WIDTH) F of each edge of a region, down to the upper stub
+    own_h: Stack  #: (B, 6, WIDTH) what currents make of the voltage there
+    top: Stack  #: (2, 18, WIDTH) W of a region, and what its charging differs by
+    top_j: Stack  #: (1, 6, WIDTH) its X
     v: Stack  #: (B + 1, 6, WIDTH)
-    follows: NDArray[np.float64]  #: (1, WIDTH)
+    here: Stack  #: (2, 18, WIDTH) W and P at a break
+    here_j: Stack  #: (2, 6, WIDTH) x and h there
+    event: Stack  #: (2, 18, WIDTH) P at the event node, F below it
+    event_j: Stack  #: (2, 6, WIDTH) what currents make of these voltages
+    event_y: Stack  #: (2, 18, WIDTH) shunts at its stubs
+    stub: Stack  #: (2, 6, WIDTH)
+    follows: Real  #: (1, WIDTH)
     turn: Stack  #: (1, 18, WIDTH) T of a regulator
     current: Stack  #: (1, 6, WIDTH) at a probe
     g: Stack  #: (U, 18, WIDTH)
@@ -60,46 +80,54 @@ class Wide(NamedTuple):
     unit_y: Stack  #: (U, 6, WIDTH) loads across the LV windings
     branch_y: Stack  #: (P, 2, WIDTH) as last eliminated
     branch_own: Stack  #: (P, 2, WIDTH) as the voltages have it
-    winding_v_pu: NDArray[np.float64]  #: (N, WIDTH)
-    history: NDArray[np.float64]  #: (3, N, WIDTH)
+    winding_v_pu: Real  #: (N, WIDTH)
+    history: Real  #: (3, N, WIDTH)
 
 
-def wide_workspace(tree: Tree, probes: Probes) -> tuple[Wide, Work]:
-    """Scratch in lanes, and that of ``workspace`` with an axis of lanes before all others."""
+def wide_workspace(tree: Tree, probes: Probes) -> Wide:
+    """Scratch for a network, and what the ladder must know of it beside its tree."""
     nodes, units, branches = tree.parent.size, tree.unit_node.size, tree.branch_node.size
-    windings = 4 * (units + 1) + branches
-    visit, leap = np.full(nodes, PLAIN), np.full(nodes, -1)
-    above, place = tree.parent.copy(), np.zeros(tree.leap_from.size, np.int64)
-    above[0] = nodes
-    visit[tree.passed >= 0] = PASSED
-    for q in range(tree.leap_from.size):
-        region = tree.region_node[tree.region_from[q] : tree.region_from[q + 1]]
-        k = region.min() if q < tree.twigs else np.flatnonzero(tree.leap == q)[0]
-        visit[k] = TWIG if q < tree.twigs else LEAP
-        leap[k], above[k], place[q] = q, tree.leap_from[q], k
-    one, loose = workspace(tree), np.diff(tree.loose_from) > 0
+    loads, windings = tree.load_unit.size, 4 * (units + 1) + branches
+    loose = np.diff(tree.loose_from) > 0
     return Wide(
-        visit=visit,
-        leap=leap,
-        above=above,
-        place=place,
+        *_visits(tree),
         loose=loose,
         kept=_kept(tree, probes, loose),
         keeps=_keeping(tree, loose),
         busy=np.zeros(nodes, np.int64),
+        demand=np.zeros(1, np.int64),
         scenario=np.zeros(WIDTH, np.int64),
         flags=np.zeros(WIDTH, np.int64),
-        load_scale=_aligned(tree.load_unit.size),
-        exponent=_aligned(tree.load_unit.size),
+        edge=np.zeros(WIDTH, np.int64),
+        far=np.zeros(WIDTH, np.int64),
+        opened=np.zeros(3, np.int64),
+        empty=np.zeros(3, np.int64),
+        load_scale=_aligned(loads),
+        exponent=_aligned(loads),
         ratio=_aligned(tree.reference.shape[0], 3),
         emf_pu=_aligned(1),
+        share=_aligned(1),
+        step_power=_aligned(1),
+        step_y=_aligned(1, 6),
+        between_y=_aligned(1, 6),
+        fallen_y=_aligned(1, 6),
         y=_aligned(nodes, 18),
         f=_aligned(nodes, 18),
         w=_aligned(nodes, 18),
         y_j=_aligned(nodes, 6),
         h_j=_aligned(nodes, 6),
         x_j=_aligned(nodes, 6),
+        own_f=_aligned(nodes, 18),
+        own_h=_aligned(nodes, 6),
+        top=_aligned(2, 18),
+        top_j=_aligned(1, 6),
         v=_aligned(nodes + 1, 6),
+        here=_aligned(2, 18),
+        here_j=_aligned(2, 6),
+        event=_aligned(2, 18),
+        event_j=_aligned(2, 6),
+        event_y=_aligned(2, 18),
+        stub=_aligned(2, 6),
         follows=_aligned(1),
         turn=_aligned(1, 18),
         current=_aligned(1, 6),
@@ -110,7 +138,22 @@ def wide_workspace(tree: Tree, probes: Probes) -> tuple[Wide, Work]:
         branch_own=_aligned(branches, 2),
         winding_v_pu=_aligned(windings),
         history=_aligned(3, windings),
-    ), Work._make(np.zeros((WIDTH, *part.shape), part.dtype) for part in one)
+    )
+
+
+def _visits(tree: Tree) -> tuple[Int, Int, Int, Int]:
+    """How each node is taken, its leap, the node above that is seen, and where leaps are taken."""
+    nodes = tree.parent.size
+    visit, leap = np.full(nodes, PLAIN), np.full(nodes, -1)
+    above, place = tree.parent.copy(), np.zeros(tree.leap_from.size, np.int64)
+    above[0] = nodes
+    visit[tree.passed >= 0] = PASSED
+    for q in range(tree.leap_from.size):
+        region = tree.region_node[tree.region_from[q] : tree.region_from[q + 1]]
+        k = region.min() if q < tree.twigs else region[tree.leap[region] == q][0]
+        visit[k] = TWIG if q < tree.twigs else LEAP
+        leap[k], above[k], place[q] = q, tree.leap_from[q], k
+    return visit, leap, above, place
 
 
 def _kept(tree: Tree, probes: Probes, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -141,42 +184,3 @@ def _aligned(*shape: int) -> NDArray[np.float64]:
     room = np.zeros(size + ALIGNED // 8)
     first = -room.ctypes.data // 8 % (ALIGNED // 8)
     return room[first : first + size].reshape(*shape, WIDTH)
-
-
-@compiled
-def lane_of(lanes: Work, lane: int) -> Work:
-    """One scenario's own scratch."""
-    return Work(
-        lanes.y[lane],
-        lanes.f[lane],
-        lanes.h[lane],
-        lanes.h_j[lane],
-        lanes.w[lane],
-        lanes.x[lane],
-        lanes.x_j[lane],
-        lanes.x_low[lane],
-        lanes.y_j[lane],
-        lanes.v[lane],
-        lanes.g[lane],
-        lanes.g_j[lane],
-        lanes.branch_y[lane],
-        lanes.unit_y[lane],
-        lanes.unit_j[lane],
-        lanes.event_y[lane],
-        lanes.xt[lane],
-        lanes.u[lane],
-        lanes.u_j[lane],
-        lanes.chord[lane],
-        lanes.here[lane],
-        lanes.here_j[lane],
-        lanes.here_x[lane],
-        lanes.here_h[lane],
-        lanes.row[lane],
-        lanes.event[lane],
-        lanes.event_h[lane],
-        lanes.event_j[lane],
-        lanes.stub[lane],
-        lanes.winding_v_pu[lane],
-        lanes.history[lane],
-        lanes.follows[lane],
-    )
