@@ -120,7 +120,7 @@ def _undominated(goals: Real) -> Int:
         for rank in ranks:
             outdone &= rank[: head.size, None] >= rank
         outdone[:, : head.size] = np.triu(outdone[:, : head.size], 1)
-        stays = ~outdone.any(axis=0)
+        stays = np.logical_not(outdone.any(axis=0))
         kept.append(head[stays[: head.size]])
         stays[: head.size] = False
         left, ranks = left[stays], ranks[:, stays]
