@@ -7,8 +7,10 @@ has run away over ΔT; and a random error is added, bounded by the total vector 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,14 +100,51 @@ def measure(v: Complex, i: Complex, errors: Errors, bounds: Bounds) -> Phasors:
     omega = 2.0 * np.pi * bounds.nominal_hz
     turn = errors.clock * np.float64(omega * bounds.clock_us / 1e6)
     drift = errors.frequency * np.float64(2.0 * np.pi * bounds.frequency_hz * bounds.dt_s)
-    v_gain = _gain(errors.v_ratio, errors.v_angle, turn, bounds)
-    i_gain = _gain(errors.i_ratio, errors.i_angle, turn, bounds)
-    return Phasors(
-        v=_reported(v, v_gain, drift, errors.v_noise * _bound(v, bounds.tve_pct, 0.0)),
-        i=_reported(
-            i, i_gain, drift, errors.i_noise * _bound(i, bounds.tve_pct, bounds.current_floor_a)
-        ),
-    )
+    now = np.exp(1j * drift) if drift.any() else np.ones(drift.shape, np.complex128)
+    ratio, angle = bounds.ratio_pct / 100.0, bounds.angle_mrad / 1000.0
+    tve, floor_a = bounds.tve_pct / 100.0, bounds.current_floor_a
+    reported = Phasors(v=np.empty(v.shape, np.complex128), i=np.empty(i.shape, np.complex128))
+    v_own = _Own(noise=errors.v_noise, ratio=errors.v_ratio, angle=errors.v_angle)
+    i_own = _Own(noise=errors.i_noise, ratio=errors.i_ratio, angle=errors.i_angle)
+    _report(v, v_own, turn, now, (ratio, angle, tve, 0.0), reported.v)
+    _report(i, i_own, turn, now, (ratio, angle, tve, floor_a), reported.i)
+    return reported
+
+
+class _Own(NamedTuple):
+    """Errors of one kind of phasor, as in ``Errors``, for compiled code."""
+
+    noise: Complex
+    ratio: Single
+    angle: Single
+
+
+@compiled
+def _report(
+    true: Complex,
+    own: _Own,
+    turn: Real,
+    now: Complex,
+    most: tuple[float, float, float, float],
+    reported: Complex,
+) -> None:
+    """Fill ``reported`` (2, P, 3, S); ``most`` bounds ratio, angle, and noise with its floor."""
+    _, points, phases, size = true.shape
+    ratio, angle, tve, floor = most
+    for p in range(points):
+        for k in range(phases):
+            for s in range(size):
+                theta = own.angle[p, k, s] * angle + turn[p, s]
+                gain = 1.0 + own.ratio[p, k, s] * ratio
+                turned = complex(gain * math.cos(theta), gain * math.sin(theta))
+                for frame in range(2):
+                    x = true[frame, p, k, s]
+                    bound = max(math.sqrt(x.real * x.real + x.imag * x.imag) * tve, floor)
+                    noise = own.noise[frame, p, k, s] * bound
+                    if frame == 1:
+                        reported[frame, p, k, s] = x * turned * now[s] + noise
+                    else:
+                        reported[frame, p, k, s] = x * turned + noise
 
 
 class Wiring(IntEnum):
@@ -146,32 +185,6 @@ def miswire(phasors: Phasors, point: NDArray[np.int64], kind: NDArray[np.int64])
         v[:, at, k, wrong] = phasors.v[:, at, _V_PHASE[how, k], wrong]
         i[:, at, k, wrong] = _I_SIGN[how, k] * phasors.i[:, at, _I_PHASE[how, k], wrong]
     return Phasors(v=v, i=i)
-
-
-def _gain(ratio: Single, angle: Single, turn: Real, bounds: Bounds) -> Complex:
-    """(P, 3, S) what a transformer and its point's clock make of every phasor."""
-    theta = angle * np.float64(bounds.angle_mrad / 1000.0) + turn[:, None]
-    size = 1.0 + ratio * np.float64(bounds.ratio_pct / 100.0)
-    gain = np.empty(theta.shape, np.complex128)
-    np.multiply(size, np.cos(theta), out=gain.real)
-    np.multiply(size, np.sin(theta), out=gain.imag)
-    return gain
-
-
-def _bound(true: Complex, tve_pct: float, floor: float) -> Real:
-    """Largest random error of each phasor."""
-    bound = np.abs(true)
-    bound *= tve_pct / 100.0
-    return np.maximum(bound, floor, out=bound)
-
-
-def _reported(true: Complex, gain: Complex, drift: Real, noise: Complex) -> Complex:
-    """One kind of phasor; ``drift`` is the angle of the frame of now."""
-    reported = true * gain
-    if drift.any():
-        reported[1] *= np.exp(1j * drift)
-    reported += noise
-    return reported
 
 
 def _uniform(rng: np.random.Generator, shape: tuple[int, ...]) -> Single:

@@ -25,6 +25,7 @@ phase may rightly carry power against the others: a false alarm.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
@@ -32,7 +33,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from ..model.compiled import compiled
 from ..model.points import Terminal
+from ..model.symmetrical import A
 from .evidence import Phasors, reversed_terminals
 from .superimpose import negative_sequence, positive_sequence, zero_sequence
 
@@ -137,13 +140,15 @@ def wiring_alarm(
     far = reversed_terminals(terminals)
     if (far < 0).any():
         raise ValueError("wiring is judged by both ends: give both directions of each section")
-    live = (np.abs(v) >= limits.live_pu * nominal[:, None, None]).all(axis=1)
-    v1 = positive_sequence(v)
-    v2 = np.abs(negative_sequence(v))
-    disordered = live & (v2 > np.abs(v1))
+    v1, v_sizes = _sequences(v)
+    i1, i_sizes = _sequences(i)
+    v2 = v_sizes[1]
+    live = v_sizes[3] >= limits.live_pu * nominal[:, None]
+    disordered = live & (v2 > v_sizes[0])
     orderly = live & (v2 <= limits.unbalance_pu * nominal[:, None])
-    turned, crossed = _turned(i, limits), _crossed(i, limits) & orderly[:, None]
-    active_a = (positive_sequence(i) * v1.conj()).real / nominal[:, None]
+    turned = _turned(i, i_sizes, limits)
+    crossed = _crossed(i_sizes, limits) & orderly[:, None]
+    active_a = (i1 * v1.conj()).real / nominal[:, None]
     alarm = np.zeros((len(terminals), v.shape[-1]), np.int8)
     for t, terminal in enumerate(terminals):
         if far[t] < t:  # the other direction of a section that is judged
@@ -180,10 +185,10 @@ def fed_one_way(terminals: tuple[Terminal, ...]) -> Flags:
     return np.asarray((far >= 0) & (load_side != load_side[far]))
 
 
-def _turned(i: Complex, limits: Limits) -> Flags:
+def _turned(i: Complex, sizes: Real, limits: Limits) -> Flags:
     """(P, 3, S): phases whose current, of (P, 3, S), seems to be turned round."""
     found = np.zeros(i.shape, np.bool_)
-    size, i2, i0 = _sizes(i)
+    size, i2, i0 = sizes[:3]
     suspect = np.maximum(i2, i0) > size
     if suspect.any():
         p, s = np.nonzero(suspect)
@@ -194,12 +199,12 @@ def _turned(i: Complex, limits: Limits) -> Flags:
     return found
 
 
-def _crossed(i: Complex, limits: Limits) -> Flags:
-    """(P, 3, S): phases k whose current, of (P, 3, S), seems to be that of k+1 and the reverse.
+def _crossed(sizes: Real, limits: Limits) -> Flags:
+    """(P, 3, S): phases k whose current seems to be that of k+1 and the reverse.
 
     The sizes of I1, I2 and I0 do not say which two: all three pairs, or none.
     """
-    i1, size, i0 = _sizes(i)
+    i1, size, i0 = sizes[:3]
     found = (np.maximum(i1, i0) <= limits.turned * size) & (size >= limits.least_a)
     return np.repeat(found[:, None], 3, axis=1)
 
@@ -216,6 +221,34 @@ def _balanced_by(
         _, i2, i0 = _sizes(taken - inward[end] + mend(inward[end], k))
         found[end, k] &= np.maximum(i2, i0) <= most
     return found
+
+
+def _sequences(abc: Complex) -> tuple[Complex, Real]:
+    """Of phases (P, 3, S): X1, (P, S); and |X1|, |X2|, |X0| and the least phase, (4, P, S)."""
+    points, _, size = abc.shape
+    first, sizes = np.empty((points, size), np.complex128), np.empty((4, points, size))
+    _fill_sequences(abc, first, sizes)
+    return first, sizes
+
+
+@compiled
+def _fill_sequences(abc: Complex, first: Complex, sizes: Real) -> None:
+    for p in range(abc.shape[0]):
+        for s in range(abc.shape[2]):
+            a, b, c = abc[p, 0, s], abc[p, 1, s], abc[p, 2, s]
+            x1 = (a + A * b + A.conjugate() * c) / 3.0
+            x2 = (a + A.conjugate() * b + A * c) / 3.0
+            x0 = (a + b + c) / 3.0
+            first[p, s] = x1
+            sizes[0, p, s] = math.sqrt(x1.real * x1.real + x1.imag * x1.imag)
+            sizes[1, p, s] = math.sqrt(x2.real * x2.real + x2.imag * x2.imag)
+            sizes[2, p, s] = math.sqrt(x0.real * x0.real + x0.imag * x0.imag)
+            least = min(
+                a.real * a.real + a.imag * a.imag,
+                b.real * b.real + b.imag * b.imag,
+                c.real * c.real + c.imag * c.imag,
+            )
+            sizes[3, p, s] = math.sqrt(least)
 
 
 def _sizes(i: Complex) -> tuple[Real, Real, Real]:

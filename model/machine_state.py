@@ -58,16 +58,23 @@ def machine_state(
     connected = va[motors:] != 0.0
     y[motors:, 0] = np.where(connected, own.der_y_s[:, 0, None], 0.0)
     y[motors:, 2] = np.where(connected, own.der_y_s[:, 2, None], 0.0)
-    static = load_scale.copy()
-    static[load] *= 1.0 - share
     return {
-        "load_scale": static,
+        "load_scale": _without_motors(load_scale, load, share),
         "exponent": exponent,
         "machine_va": va,
         "machine_exponent": follows,
         "machine_y_s": y,
         "machine_j_a": np.zeros((own.count, size), np.complex128),
     }
+
+
+def _without_motors(load_scale: Real, load: Int, share: Real) -> Real:
+    """(L, S) factors on what is no motor of every load; those given where there are none."""
+    if not load.size:
+        return load_scale
+    static = load_scale.copy()
+    static[load] *= 1.0 - share
+    return static
 
 
 def carried_over(

@@ -108,18 +108,34 @@ def _undominated(goals: Real) -> Int:
     Of equal columns the first stays. Whatever outdoes a column has a larger sum of ranks: in
     that order each column is outdone by an earlier one or by none.
     """
-    ranks = np.sum([np.searchsorted(np.sort(goal), goal) for goal in goals], axis=0)
-    left = np.argsort(-ranks, kind="stable")
+    ranks = np.stack([_ranks(goal) for goal in goals])
+    left = np.argsort(-ranks.sum(axis=0), kind="stable")
+    # small whole numbers are compared several at a time
+    whole = np.int16 if left.size <= np.iinfo(np.int16).max else np.int32
+    ranks = ranks[:, left].astype(whole)
     kept = [left[:0]]
     while left.size:
         head = left[:HEAD]
         outdone = np.ones((head.size, left.size), np.bool_)  # [by, which]
-        for goal in goals:
-            outdone &= goal[head, None] >= goal[left]
-        gone = np.asarray(np.triu(outdone, 1).any(axis=0))
-        kept.append(head[~gone[: head.size]])
-        left = left[head.size :][~gone[head.size :]]
+        for rank in ranks:
+            outdone &= rank[: head.size, None] >= rank
+        outdone[:, : head.size] = np.triu(outdone[:, : head.size], 1)
+        stays = np.logical_not(outdone.any(axis=0))
+        kept.append(head[stays[: head.size]])
+        stays[: head.size] = False
+        left, ranks = left[stays], ranks[:, stays]
     return np.sort(np.concatenate(kept))
+
+
+def _ranks(values: Real) -> Int:
+    """(n,) how many different values lie below each of (n,)."""
+    order = np.argsort(values)
+    rising = values[order]
+    new = np.zeros(values.size, np.bool_)
+    np.not_equal(rising[1:], rising[:-1], out=new[1:])
+    ranks = np.empty(values.size, np.int64)
+    ranks[order] = np.cumsum(new)
+    return ranks
 
 
 def border(front: Front, v_set_pu: float, margin: float = 1.0) -> tuple[Real, Real]:

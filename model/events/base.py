@@ -117,10 +117,25 @@ def no_event(network: Network, size: int) -> Event:
         far_between_before_s=nothing,
         far_between_after_s=nothing,
         emf_factor=np.ones(size),
-        tap_factor=np.ones((len(network.regulators), 3, size)),
-        load_factor=np.ones((len(network.loads), size)),
-        der_factor=np.ones((len(network.machines.ders), size)),
+        tap_factor=_ones(len(network.regulators), 3, size),
+        load_factor=_ones(len(network.loads), size),
+        der_factor=_ones(len(network.machines.ders), size),
     )
+
+
+def _ones(*shape: int) -> Real:
+    """Factors that change nothing, and take no memory: to be read only."""
+    return np.broadcast_to(np.float64(1.0), shape)
+
+
+def _is_one(factor: Real) -> bool:
+    """Whether a factor is what ``_ones`` makes, told without reading it all."""
+    return not any(factor.strides) and bool((factor.reshape(-1)[:1] == 1.0).all())
+
+
+def _times(values: Real, factor: Real) -> Real:
+    """The values times their factors; themselves where nothing changes them."""
+    return values if _is_one(factor) else values * factor
 
 
 def apply_event(network: Network, before: State, after: State, event: Event) -> tuple[State, State]:
@@ -132,9 +147,11 @@ def apply_event(network: Network, before: State, after: State, event: Event) -> 
     """
     motor_load = network.machines.motor_load
     motors = slice(0, motor_load.size)
-    va, y = after.machine_va.copy(), after.machine_y_s.copy()
-    va[motors] *= event.load_factor[motor_load]
-    y[motors] *= event.load_factor[motor_load][:, None]
+    va, y = after.machine_va, after.machine_y_s
+    if motor_load.size and not _is_one(event.load_factor):
+        va, y = va.copy(), y.copy()
+        va[motors] *= event.load_factor[motor_load]
+        y[motors] *= event.load_factor[motor_load][:, None]
     first = before._replace(
         edge=event.edge,
         share=event.share,
@@ -149,8 +166,8 @@ def apply_event(network: Network, before: State, after: State, event: Event) -> 
     )
     second = after._replace(
         emf_pu=after.emf_pu * event.emf_factor,
-        ratio=after.ratio * event.tap_factor,
-        load_scale=after.load_scale * event.load_factor,
+        ratio=_times(after.ratio, event.tap_factor),
+        load_scale=_times(after.load_scale, event.load_factor),
         machine_va=va,
         machine_y_s=y,
         edge=event.edge,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import sys
@@ -9,6 +10,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from typing import TypeVar
 
 from joblib import Parallel, delayed
@@ -62,6 +64,7 @@ def run_blocks(
 
 def _compute(compute: Callable[[BlockId], T], missing: Sequence[BlockId], jobs: int) -> Iterator[T]:
     if jobs == 1:
+        _keep_memory()
         yield from (compute(which) for which in missing)
         return
     parallel = Parallel(
@@ -86,6 +89,7 @@ def _compute(compute: Callable[[BlockId], T], missing: Sequence[BlockId], jobs: 
 
 def _follow_the_parent(parent: int) -> None:
     """A worker leaves interrupts to its parent, and ends when the parent has been killed."""
+    _keep_memory()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
@@ -94,3 +98,18 @@ def _follow_the_parent(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def _keep_memory() -> None:
+    """Let freed memory stay with the process, where the C library is one that can be told to.
+
+    Block follows block with arrays of the same sizes; given back and fetched anew each time,
+    they cost as much as filling them.
+    """
+    with suppress(OSError, AttributeError, TypeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_MMAP_THRESHOLD, 32 << 20)
+        mallopt(_TRIM_THRESHOLD, 1 << 30)
+
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # names of the GNU C library's malloc.h

@@ -16,11 +16,12 @@ from ...model.machine_state import machine_state
 from ...model.machines import DER_MODELS
 from ...model.network import CONNECTIONS
 from ...model.solve import quiet_state
-from ...model.states import BY_LAW, State
+from ...model.states import State
 from ..spec.correlations import draw_scalars
 from .cases import Case, Group, Wired, make_case, make_cases
 from .classes import DrawClass, Purpose
 from .draw_event import draw_event, draw_wiring
+from .load_draws import draw_loads
 from .load_levels import load_levels
 
 __all__ = [
@@ -128,20 +129,15 @@ def _draw_states(rng: np.random.Generator, case: Case, size: int) -> tuple[State
     study, network = case.study, case.network
     scalars = draw_scalars(rng, study, size)
     shape = (len(network.loads), size)
-    level = load_levels(study, case.load_places, scalars)
-    scale = level * study.loads.each.draw(rng, shape)
-    spread = rng.uniform(-study.loads.exponent_spread, study.loads.exponent_spread, shape)
-    # where the study leaves it to the file, each load follows its own law there
-    common = scalars.get("loads.exponent")
-    exponent = np.full(shape, BY_LAW) if common is None else np.clip(common + spread, 0.0, 2.0)
+    level = np.broadcast_to(load_levels(study, case.load_places, scalars), shape)
+    scale, exponent, later_scale = draw_loads(rng, study, level, scalars.get("loads.exponent"))
     source_change = scalars["ambient.source_pct"] / 100.0
-    load_change = rng.uniform(-study.ambient.load_pct, study.ambient.load_pct, shape) / 100.0
     machines = _machine_draws(case, scalars, size)
     before = quiet_state(
         network, scale, exponent, machine_state(network, scale, exponent, **machines)
     )
     before = before._replace(connection=_draw_connections(rng, case, scalars, before))
-    later = machine_state(network, scale * (1.0 + load_change), exponent, **machines)
+    later = machine_state(network, later_scale, exponent, **machines)
     after = before._replace(**later)
     after = after._replace(emf_pu=before.emf_pu * (1.0 + source_change))
     return before, after, _draw_der_models(rng, case, size)

@@ -6,6 +6,7 @@ changed input starts afresh and says so.
 
 from __future__ import annotations
 
+import functools
 import io
 import json
 import os
@@ -75,13 +76,25 @@ def pack(value: Any, name: str = "") -> dict[str, NDArray[Any]]:
 def npz(arrays: dict[str, NDArray[Any]]) -> bytes:
     """Named arrays as the bytes of an npz file; equal arrays give equal bytes."""
     buffer = io.BytesIO()
-    np.savez(buffer, **arrays)  # type: ignore[arg-type]
+    with zipfile.ZipFile(buffer, "w") as file:
+        for name, values in arrays.items():
+            content = _head(values.dtype, values.shape) + values.tobytes()
+            file.writestr(zipfile.ZipInfo(f"{name}.npy"), content)
+    return buffer.getvalue()
+
+
+@functools.lru_cache(maxsize=4096)
+def _head(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
+    """What stands before an array's numbers in an npy file; most arrays are of few shapes."""
+    buffer = io.BytesIO()
+    own = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(buffer, own)
     return buffer.getvalue()
 
 
 def unpack(kind: type[T], flat: dict[str, NDArray[Any]], name: str = "") -> T:
     """Rebuild what ``pack`` flattened, from the dataclass's annotations."""
-    hints = typing.get_type_hints(kind)
+    hints = _hints(kind)  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     for field in fields(kind):  # type: ignore[arg-type]
         hint, key = hints[field.name], f"{name}.{field.name}" if name else field.name
@@ -93,6 +106,11 @@ def unpack(kind: type[T], flat: dict[str, NDArray[Any]], name: str = "") -> T:
         else:
             values[field.name] = flat[key]
     return kind(**values)
+
+
+@functools.cache
+def _hints(kind: type) -> dict[str, Any]:
+    return typing.get_type_hints(kind)
 
 
 def _length(flat: dict[str, NDArray[Any]], name: str) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optimise.staircase import Front, merge_fronts
+from .choose import MERGE_EVERY
 from .classes import DrawClass
 from .draw import BlockId
 from .tally import FLAGGED, Tested
@@ -49,7 +50,7 @@ SAMPLED_BLOCKS = 25  #: blocks of a class whose kept evidence goes into pictures
 def add_up(blocks: Iterable[tuple[BlockId, Tested]], size: int) -> Validation:
     """Add blocks of ``size`` scenarios; memory does not grow with their number."""
     total: dict[str, Any] = {}
-    front: tuple[Front, ...] = ()
+    fronts: list[tuple[Front, ...]] = []
     samples: list[tuple[BlockId, NDArray[np.float64], NDArray[np.int8]]] = []
     least = np.array(np.inf)
     flags = np.zeros((len(DrawClass), len(FLAGGED)), np.int64)
@@ -60,15 +61,21 @@ def add_up(blocks: Iterable[tuple[BlockId, Tested]], size: int) -> Validation:
         least = np.minimum(least, block.least_z_ohm)
         for name in ADDED:
             total[name] = total.get(name, 0) + getattr(block, name)
-        pairs = zip(front, block.front, strict=True) if front else ()
-        front = tuple(merge_fronts(list(pair)) for pair in pairs) or block.front
+        fronts.append(block.front)
+        if len(fronts) > MERGE_EVERY:
+            fronts = [_merged(fronts)]
         if which.block < SAMPLED_BLOCKS:
             samples.append((which, block.sample, block.sample_side))
     return Validation(
-        front=front,
+        front=_merged(fronts),
         least_z_ohm=least,
         flags=flags,
         scenarios=count,
         samples=tuple(samples),
         **total,
     )
+
+
+def _merged(fronts: list[tuple[Front, ...]]) -> tuple[Front, ...]:
+    """Fronts by block and terminal, as one of each terminal."""
+    return tuple(merge_fronts(list(own)) for own in zip(*fronts, strict=True))
