@@ -322,6 +322,7 @@ def _load(row: Props) -> RawLoad:
         v_max_pu=float(row["vmaxpu"]),
         v_low_pu=float(row["vlowpu"]),
         fixed=str(row["status"]).lower() != "variable",
+        neutral_earthed=float(row["rneut"]) >= 0.0,
     )
 
 

@@ -24,13 +24,14 @@ from .dss_choices import (
 )
 from .dss_lines import LineParts, line_parts
 from .dss_live import Node, live_nodes
-from .dss_loads import capacitor_of, der_of, loads_of
+from .dss_loads import LoadWork, capacitor_of, der_of, loads_of
 from .dss_names import Names, clean, letters
 from .dss_neutrals import neutrals_of
 from .dss_records import RawCircuit, RawReactor
 from .dss_regulators import regulators_of, with_tap_changer
 from .dss_script import Script, read_script
 from .dss_spans import is_series, spans_of
+from .dss_stars import add_stars
 from .dss_transformers import Banks, inline_parts
 from .findings import Findings
 
@@ -133,10 +134,16 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
     for bus in sorted({bus for bus, _ in live}):
         build.buses.of(bus)
     _add_series(build)
-    for load in circuit.loads:
-        build.loads += loads_of(
-            load, circuit.load_mult, live, build.buses, build.load_names, findings
-        )
+    loads = LoadWork(
+        load_mult=circuit.load_mult,
+        live=live,
+        neutrals=neutrals_of(circuit),
+        buses=build.buses,
+        names=build.load_names,
+        findings=findings,
+    )
+    build.loads += [part for load in circuit.loads for part in loads_of(load, loads)]
+    build.loads += add_stars(loads.stars, build.buses, build.load_names, findings)
     names = Names()
     capacitors = [
         part
