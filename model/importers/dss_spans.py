@@ -11,6 +11,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reactors import REACTOR
 from .dss_live import Node
 from .dss_records import Matrix, RawCircuit, RawLine, RawReactor
 from .findings import Fate, Findings
@@ -165,7 +166,7 @@ def _kron(
 def _reactor_span(reactor: RawReactor, live: set[Node], findings: Findings) -> Span | None:
     """Return a reactor between two buses as a short line."""
     near, far = reactor.ends
-    name = f"reactor.{reactor.name}"
+    name = f"{REACTOR}{reactor.name}"
     if near.nodes != far.nodes or reactor.delta or not set(near.nodes) <= {1, 2, 3}:
         findings.add("reactor", reactor.name, "refused", "it joins different phases")
         return None

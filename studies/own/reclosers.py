@@ -10,6 +10,7 @@ from typing import cast, get_args
 
 from ...model.parts import Feeder, Line, Point, Regulator, Switch, VoltageSide
 from ...model.points import fed_by_its_points
+from ...model.reactors import is_reactor
 from ...model.reading.fields import did_you_mean
 from ...model.zones import adjacent_sections, outwards
 from .match import Match, by_name
@@ -28,7 +29,8 @@ class _Where:
 
     buses: tuple[str, ...]
     lines: Mapping[str, Line]
-    at: Mapping[str, Sequence[Line]]  #: lines by either bus
+    reactors: frozenset[str]  #: names of lines on which no point stands
+    at: Mapping[str, Sequence[Line]]  #: other lines by either bus
     order: Mapping[str, int]  #: of buses as the source feeds them, one after the other
     across: Mapping[str, Sequence[str]]  #: buses beyond the closed switches of each
 
@@ -120,9 +122,11 @@ def _read(table: OwnTable) -> list[Point]:
 
 def _where(feeder: Feeder) -> _Where:
     at: defaultdict[str, list[Line]] = defaultdict(list)
+    reactors = frozenset(line.name for line in feeder.lines if is_reactor(feeder, line))
     for line in feeder.lines:
-        at[line.from_bus].append(line)
-        at[line.to_bus].append(line)
+        if line.name not in reactors:
+            at[line.from_bus].append(line)
+            at[line.to_bus].append(line)
     across: defaultdict[str, list[str]] = defaultdict(list)
     for switch in feeder.switches:
         if switch.closed:
@@ -133,6 +137,7 @@ def _where(feeder: Feeder) -> _Where:
     return _Where(
         buses=tuple(buses),
         lines={line.name: line for line in feeder.lines},
+        reactors=reactors,
         at=at,
         order=order,
         across=across,
@@ -174,6 +179,8 @@ def _on_line(where: _Where, line: Line, row: Point) -> Point | str:
     ends = [bus for bus in where.around(row.bus) if bus in (line.from_bus, line.to_bus)]
     if not ends:
         return f"line {line.name} does not end at {row.bus}"
+    if line.name in where.reactors:
+        return f"{line.name} is a series reactor; a point stands on a line"
     if len(line.phases) < 3:
         return f"line {line.name} has phases {line.phases} only; a point measures three"
     return replace(row, bus=ends[0], line=line.name)

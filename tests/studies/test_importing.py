@@ -73,6 +73,16 @@ def test_points_may_be_given(circuit: Path, capsys: pytest.CaptureFixture[str]) 
     assert "points.csv" in capsys.readouterr().out
 
 
+def test_a_reactor_at_the_head_has_no_measuring_point(circuit: Path) -> None:
+    text = CIRCUIT.replace(" bus1=s bus2=m ", " bus1=h bus2=m ")
+    circuit.write_text(text + "new reactor.head bus1=s bus2=h r=0.01 x=0.3\n", encoding="utf-8")
+    out = circuit.parent / "town.toml"
+    assert run("import", circuit, "-o", out) == 0
+    feeder = read_feeder(out)
+    assert "reactor.head" in {line.name for line in feeder.lines}
+    assert (feeder.points[0].bus, feeder.points[0].line) == ("h", "trunk")
+
+
 def test_a_reduced_feeder_says_its_error(circuit: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = circuit.parent / "town.toml"
     assert run("import", circuit, "-o", out, "--reduce", "--json") == 0

@@ -124,3 +124,18 @@ def test_faults_of_the_file_are_told(tmp_path, text, faults):
         with_points(FEEDER, table(tmp_path, text))
     for fault in faults:
         assert fault in str(raised.value)
+
+
+def test_a_series_reactor_carries_no_point(tmp_path):
+    lines = tuple(
+        replace(own, name="reactor.choke") if own.name == "L2" else own for own in FEEDER.lines
+    )
+    feeder = replace(FEEDER, lines=lines, imported_from="own.dss")
+    _, match = placed(tmp_path, "on,B1,reactor.choke,", "way,B2,,", feeder=feeder)
+    assert dict(match.not_joined) == {
+        "on": "reactor.choke is a series reactor; a point stands on a line"
+    }
+    # the only line that is none leads on behind the recloser
+    assert match.joined == ("way",)
+    (point,) = placed(tmp_path, "way,B2,,", feeder=feeder)[0].points
+    assert (point.bus, point.line) == ("R", "last")
