@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from dss_circuits import script
 
+from openphase.model.errors import InputError
 from openphase.model.importers.dss_feeder import Imported, import_opendss
 from openphase.model.importers.fidelity import differences
 
@@ -125,3 +126,15 @@ def test_an_open_neutral_conductor_is_no_return_path(tmp_path: Path) -> None:
     assert how == "its neutral conductor is open: left out"
     assert largest(found) < 1e-6
     assert largest(imported(tmp_path, *code, WYE)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("element", "share"), [("transformer.t", "200.0 kW"), ("load.w", "300.0 kW")]
+)
+def test_other_elements_with_some_conductors_open_are_refused(
+    element: str, share: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match="some of its conductors are open") as refused:
+        imported(tmp_path, *LINES, WYE, *BANK, f"open {element} 1 1")
+    assert share in str(refused.value)
+    assert f"--drop {element}" in str(refused.value)
