@@ -260,7 +260,7 @@ def span(feeder: Feeder, pieces: list[Piece]) -> Span:
 
     Depth-first, so that every chord joins a node to an ancestor of its own, its fork.
     """
-    order, parent_piece, left = _walk(feeder.source.bus, pieces)
+    order, parent_piece, left = _walk(feeder.source.bus, pieces, {})
     place = {name: k for k, name in enumerate(order)}
     forks = {n: min(pieces[n].ends, key=place.__getitem__) for n in left}
     if any(pieces[n].is_bare for n in left):
@@ -324,16 +324,16 @@ def _other(piece: Piece, end: str) -> str:
 
 
 def _walk(
-    root: str, pieces: list[Piece], together: dict[str, list[str]] | None = None
+    root: str, pieces: list[Piece], together: dict[str, list[str]]
 ) -> tuple[list[str], dict[str, int], list[int]]:
     """Depth-first walk; returns order, parent pieces, and pieces to known nodes left over.
 
-    With ``together``, buses that are so are entered one straight after the other, and what has
-    no impedance is walked before lines are.
+    Buses that are ``together`` are entered one straight after the other, and what has no
+    impedance is walked before lines are.
     """
     touching: dict[str, list[int]] = defaultdict(list)
     ranks = list(range(len(pieces)))
-    if together is not None:
+    if together:
         ranks.sort(key=lambda n: (not pieces[n].is_bare, pieces[n].line is not None, n))
     for n in ranks:
         for end in pieces[n].ends:
@@ -356,7 +356,7 @@ def _walk(
         if came >= 0:
             parent_piece[name] = came
         entered = [name]
-        if together and name in together:
+        if name in together:
             entered = _enter(name, pieces, touching, parent_piece, used, set(together[name]))
             order += entered[1:]
         for member in reversed(entered):

@@ -43,7 +43,6 @@ OPEN = {
         "open line.l2 1 1",
     ),
     "charging alone": (*LINES, "open line.l1 1 1"),
-    "in a loop": (*RING, DELTA, WYE, "open line.l1 1 2", "open line.l2 1 1", "open line.l2 1 3"),
     "beside an open end": (*RING, DELTA, WYE, "open line.l2 1", "open line.l2 2 3"),
 }
 
@@ -82,6 +81,14 @@ def test_an_open_conductor_is_two_switches_of_which_one_is_open(tmp_path: Path) 
     }
     assert {(s.from_bus, s.to_bus) for s in switches.values()} == {("b_l1", "b")}
     assert any("line l1 is open in a" in note for note in found.findings.notes)
+
+
+def test_a_loop_that_closes_over_the_closed_conductors_is_refused_by_name(tmp_path: Path) -> None:
+    found = imported(tmp_path, *RING, DELTA, WYE, "open line.l1 1 2")
+    with pytest.raises(
+        InputError, match="the loop over the switch 'm'–'m_l1' must close over a line"
+    ):
+        differences(found)
 
 
 def test_a_line_through_which_no_fed_conductor_passes_is_not_fed(tmp_path: Path) -> None:
