@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
-__all__ = ["Fault", "InputError", "KeyPath", "Locator", "OpenPhaseError", "Report"]
+__all__ = ["Fault", "Gathered", "InputError", "KeyPath", "Locator", "OpenPhaseError", "Report"]
+
+_T = TypeVar("_T")
 
 KeyPath = tuple[str | int, ...]
 """A value's place in a document: ``("lines", 2, "length_km")``, arrays counted from 0."""
@@ -90,6 +92,38 @@ class InputError(OpenPhaseError):
         if len(lines) > 1:
             lines.append(f"{len(lines)} faults")
         return "\n".join(lines)
+
+
+@dataclass(slots=True)
+class Gathered:
+    """Collects the faults of several inputs, so that those of all are told at once.
+
+    Examples
+    --------
+    >>> gathered = Gathered()
+    >>> def refuse() -> None:
+    ...     raise InputError.single("", "--jobs", "0", "must be > 0")
+    >>> gathered.of(refuse), gathered.of(lambda: 3)
+    (None, 3)
+    >>> gathered.raise_if_any()
+    Traceback (most recent call last):
+    openphase.model.errors.InputError: --jobs must be > 0, got 0
+    """
+
+    faults: list[Fault] = field(default_factory=list)
+
+    def of(self, work: Callable[[], _T]) -> _T | None:
+        """Return what ``work`` returns; None where it refuses its input, and keep why."""
+        try:
+            return work()
+        except InputError as error:
+            self.faults += error.faults
+            return None
+
+    def raise_if_any(self) -> None:
+        """Raise InputError with all faults so far, if there are any."""
+        if self.faults:
+            raise InputError(self.faults)
 
 
 def _unknown_line(path: KeyPath) -> None:

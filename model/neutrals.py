@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
+from typing import Protocol, TypeVar
 
 from .parts import Feeder, InlineTransformer, Line, Regulator, Switch, Transformer
 
-__all__ = ["bus_neutrals", "wires_at_unknown"]
+__all__ = ["bus_earthings", "bus_neutrals", "wires_at_unknown"]
+
+_T = TypeVar("_T")
+_T_co = TypeVar("_T_co", covariant=True)
 
 
 def bus_neutrals(feeder: Feeder) -> dict[str, bool]:
@@ -14,7 +18,36 @@ def bus_neutrals(feeder: Feeder) -> dict[str, bool]:
 
     A winding between phases has none, nor has a star that is not earthed.
     """
-    joined: defaultdict[str, list[tuple[str, bool | None]]] = defaultdict(list)
+    return _by_feeding(feeder, feeder.source.wires == 4, _earthed)
+
+
+def bus_earthings(feeder: Feeder) -> dict[str, str]:
+    """How what feeds each bus is earthed.
+
+    That is the source's neutral; for an in-line transformer's winding ``solid``, ``impedance`` or
+    ``isolated``.
+    """
+
+    def earthing(unit: InlineTransformer, *, to_side: bool) -> str:
+        if not _earthed(unit, to_side=to_side):
+            return "isolated"
+        ohm = unit.to_neutral_ohm if to_side else unit.from_neutral_ohm
+        return "impedance" if ohm else "solid"
+
+    source: str = feeder.source.neutral
+    return _by_feeding(feeder, source, earthing)
+
+
+class _OfWinding(Protocol[_T_co]):
+    """What is to be known of one side of a unit."""
+
+    def __call__(self, unit: InlineTransformer, *, to_side: bool) -> _T_co: ...
+
+
+def _by_feeding(feeder: Feeder, at_source: _T, of_winding: _OfWinding[_T]) -> dict[str, _T]:
+    """Something of every bus that is the source's, or of the winding that feeds it."""
+    joined: defaultdict[str, list[tuple[str, tuple[InlineTransformer, bool] | None]]]
+    joined = defaultdict(list)
     joining: list[Line | Switch | Regulator] = [
         *feeder.lines,
         *feeder.switches,
@@ -24,15 +57,16 @@ def bus_neutrals(feeder: Feeder) -> dict[str, bool]:
         joined[part.from_bus].append((part.to_bus, None))
         joined[part.to_bus].append((part.from_bus, None))
     for unit in feeder.inline_transformers:
-        joined[unit.from_bus].append((unit.to_bus, _earthed(unit, to_side=True)))
-        joined[unit.to_bus].append((unit.from_bus, _earthed(unit, to_side=False)))
-    found = {feeder.source.bus: feeder.source.wires == 4}
+        joined[unit.from_bus].append((unit.to_bus, (unit, True)))
+        joined[unit.to_bus].append((unit.from_bus, (unit, False)))
+    found = {feeder.source.bus: at_source}
     waiting = deque([feeder.source.bus])
     while waiting:
         bus = waiting.popleft()
-        for far, makes in joined[bus]:
+        for far, winding in joined[bus]:
             if far not in found:
-                found[far] = found[bus] if makes is None else makes
+                own = found[bus]
+                found[far] = own if winding is None else of_winding(winding[0], to_side=winding[1])
                 waiting.append(far)
     return found
 

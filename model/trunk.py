@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from .buses import bus_volts
 from .line_matrices import z1_ohm
 from .parts import Feeder, InlineTransformer, Line, Regulator, Switch
+from .reactors import is_reactor
 from .zones import nodes_of, outwards
 
 __all__ = ["Step", "Trunk", "find_trunk"]
@@ -24,7 +25,10 @@ Way = tuple[str, Joint]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """A line of the trunk, from the source on, and what stands between it and the line before."""
+    """A line of the trunk, from the source on, and what stands between it and the line before.
+
+    Series reactors stand between lines.
+    """
 
     line: Line
     near: str  #: its bus towards the source
@@ -70,7 +74,9 @@ def find_trunk(feeder: Feeder) -> Trunk | None:
         near, part = before[at]
         path.append((near, part))
         at = near
-    steps = _behind_the_substation(_steps(path[::-1], ohm))
+    lines = {name for name, line in network.items() if not is_reactor(feeder, line)}
+    path = [way for way in reversed(path) if not isinstance(way[1], Line) or way[1].name in lines]
+    steps = _behind_the_substation(_steps(path, ohm))
     if not steps:
         return None
     return Trunk(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..model.errors import InputError, OpenPhaseError
 from ..model.events.phases import count_phases
 from ..model.network import Network, assumed_connection, compile_network
-from ..model.neutrals import wires_at_unknown
+from ..model.neutrals import bus_earthings, bus_neutrals, wires_at_unknown
 from ..model.parts import Der, Feeder, InlineTransformer, Load, Place, Regulator, Switch
 from ..model.points import Terminal, find_points
 from ..model.reading.provenance import assumptions, count_origins
@@ -60,6 +60,8 @@ def summary(feeder: Feeder, study: Study, chosen: tuple[str, ...] = ()) -> dict[
         "load_kw": sum(load.kw for load in feeder.loads),
         "points": [point.name for point in feeder.points],
         "points_kv_ll": _kv_at_points(feeder, network),
+        "points_neutral": _neutrals_at_points(feeder),
+        "points_wires": _wires_at_points(feeder),
         "points_by_default": list(chosen),
         "sections": [],
         "loop": [switch.name for switch in feeder.switches if not switch.closed],
@@ -166,6 +168,18 @@ def _kv_at_points(feeder: Feeder, network: Network) -> list[float]:
     return sorted(round(float(v) * 3.0**0.5 / 1000.0, 6) for v in volts)
 
 
+def _neutrals_at_points(feeder: Feeder) -> list[str]:
+    """How the networks are earthed in which points stand, each way once."""
+    earthings = bus_earthings(feeder)
+    return sorted({earthings[point.bus] for point in feeder.points if point.bus in earthings})
+
+
+def _wires_at_points(feeder: Feeder) -> list[int]:
+    """How many wires there are where points stand, each number once."""
+    neutral = bus_neutrals(feeder)
+    return sorted({4 if neutral[p.bus] else 3 for p in feeder.points if p.bus in neutral})
+
+
 def _km_by_phases(network: Network, chosen: NDArray[np.bool_]) -> list[float]:
     """Length of the chosen edges with one, two and three phases."""
     count = count_phases(network.tree.phases)
@@ -187,12 +201,16 @@ def _kw_below(feeder: Feeder, network: Network, terminal: Terminal, *, nearest: 
 
 
 def _assumed(feeder: Feeder) -> list[str]:
-    """What the model takes for granted about any feeder."""
-    said = [
-        "lines without a code are transposed; what hangs behind transformers is balanced, and so "
-        "are DER",
-        "downstream kW: nominal times the study's load range, at the section's far and near end",
-    ]
+    """What the model takes for granted about this feeder."""
+    applies = {
+        "lines without a code are transposed": any(line.code is None for line in feeder.lines),
+        "what hangs behind transformers is balanced": bool(feeder.transformers),
+        "DER are balanced": bool(feeder.ders),
+        "downstream kW: nominal times the study's load range, at the section's far and near end": (
+            bool(feeder.sections)
+        ),
+    }
+    said = [sentence for sentence, holds in applies.items() if holds]
     if any(unit.connection == "unknown" for unit in feeder.transformers):
         said.append(
             "transformers of unknown connection are drawn by a study; until then they count as "

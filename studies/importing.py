@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..model.errors import InputError
+from ..model.errors import Gathered, InputError
 from ..model.importers.dss_feeder import Imported, import_opendss
 from ..model.importers.fidelity import Difference, differences
 from ..model.importers.report import fidelity_report
@@ -24,16 +25,19 @@ from ..model.reduction.fold import fold
 from ..model.reduction.measure import LEVEL_RANGE, measure
 from ..model.reduction.report import folded_json, folded_text
 from ..model.spread import spread_points
-from .own.connections import with_transformers
+from .own.connections import OwnConnections, read_connections, with_transformers
 from .own.levels import measured_study_text
 from .own.match import Match, match_json, match_text
 from .own.peaks import with_peaks
-from .own.reclosers import with_points
+from .own.readings import Readings, read_readings
+from .own.reclosers import OwnPoints, read_points, with_points
 from .run.session import say
 from .run.store import as_json
 from .show.sheet import PAGE, wrapped
 
 __all__ = ["import_command"]
+
+_T = TypeVar("_T")
 
 _SEED = 1
 """Of the scenarios on which a reduction is measured."""
@@ -54,16 +58,32 @@ class _Work:
     levels: tuple[float, float] = LEVEL_RANGE  #: of the loads, as a study will draw them
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Own:
+    """The user's own tables, as far as they are given."""
+
+    transformers: OwnConnections | None
+    points: OwnPoints | None
+    peaks: Readings | None
+
+
 def import_command(args: argparse.Namespace) -> int:
     """Run the verb; returns the exit code. Refusals have ended it before."""
     _check_outputs(args)
     say(f"reading {args.file}")
-    imported = import_opendss(args.file, drop=args.drop, solve_controls=args.solve_controls)
+    told = Gathered()
+    own = told.of(lambda: _read_own(args))
+    imported = told.of(
+        lambda: import_opendss(args.file, drop=args.drop, solve_controls=args.solve_controls)
+    )
+    told.raise_if_any()
+    assert own is not None
+    assert imported is not None
     say(f"{len(imported.feeder.lines)} lines, {len(imported.feeder.loads)} loads; solving")
     found = differences(imported)
     report = fidelity_report(imported, found)
     work = _Work(feeder=imported.feeder)
-    _own_data(work, args)
+    _own_data(work, own, writes=args.output is not None)
     if args.reduce:
         _fold(work)
     _count_buses(work)
@@ -108,29 +128,51 @@ def _check_outputs(args: argparse.Namespace) -> None:
         raise InputError.single("", "--report", repr(str(args.report)), "must be .md or .json")
 
 
-def _own_data(work: _Work, args: argparse.Namespace) -> None:
+def _read_own(args: argparse.Namespace) -> _Own:
+    """Read the user's own tables.
+
+    Raises
+    ------
+    InputError
+        With all faults of all of them.
+    """
+    told = Gathered()
+
+    def read(path: Path | None, reader: Callable[[Path], _T]) -> _T | None:
+        return None if path is None else told.of(partial(reader, path))
+
+    own = _Own(
+        transformers=read(args.transformers, read_connections),
+        points=read(args.points, read_points),
+        peaks=read(args.peaks, read_readings),
+    )
+    told.raise_if_any()
+    return own
+
+
+def _own_data(work: _Work, own: _Own, *, writes: bool) -> None:
     """Bring in what the user knows of the feeder, and points where there are none."""
-    if args.transformers is not None:
-        work.feeder, match = with_transformers(work.feeder, args.transformers)
+    if own.transformers is not None:
+        work.feeder, match = with_transformers(work.feeder, own.transformers)
         work.matches.append(match)
-    if args.points is not None:
-        work.feeder, match = with_points(work.feeder, args.points)
+    if own.points is not None:
+        work.feeder, match = with_points(work.feeder, own.points)
         work.matches.append(match)
     else:
         spread = spread_points(work.feeder)
         work.feeder = spread.feeder
         work.lines += ["", *spread.said]
         work.parts["points"] = {"said": list(spread.said), "inside": list(spread.inside)}
-    if args.peaks is not None:
-        work.feeder, measured, match = with_peaks(work.feeder, args.peaks)
+    if own.peaks is not None:
+        work.feeder, measured, match = with_peaks(work.feeder, own.peaks)
         work.matches.append(match)
         ends = [item.level.support for item in measured]
         work.levels = (
             min(low for low, _ in [*ends, work.levels]),
             max(high for _, high in [*ends, work.levels]),
         )
-        if measured and args.output is not None:
-            work.study = measured_study_text(measured, args.peaks.name)
+        if measured and writes:
+            work.study = measured_study_text(measured, own.peaks.source)
     for match in work.matches:
         work.lines += ["", *match_text(match)]
 

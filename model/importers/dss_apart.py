@@ -86,5 +86,4 @@ def _solve(request: tuple[Script, str, tuple[str, ...], tuple[str, ...]]) -> dic
     script, source, told, modes = request
     engine = start(script.commands, source)
     with refusals_told(engine):
-        tell(engine, told)
-        return {mode: solved_volts(engine, mode=mode) for mode in modes}
+        return {mode: solved_volts(engine, mode=mode, told=told) for mode in modes}

@@ -18,6 +18,7 @@ __all__ = [
     "CapacitorStates",
     "Taps",
     "chosen",
+    "fits",
     "raise_refusals",
     "with_states",
     "with_taps",
@@ -58,36 +59,36 @@ def with_states(circuit: RawCircuit, states: CapacitorStates) -> RawCircuit:
     return replace(circuit, capacitors=tuple(switched(bank) for bank in circuit.capacitors))
 
 
-def chosen(circuit: RawCircuit, drop: Collection[str], source: str) -> tuple[str, ...]:
-    """Return the elements that ``class.name`` patterns mean.
-
-    Raises
-    ------
-    InputError
-        With every pattern that fits nothing, or the source.
-    """
+def chosen(
+    circuit: RawCircuit, drop: Collection[str], source: str
+) -> tuple[tuple[str, ...], list[Fault]]:
+    """Return the elements that ``class.name`` patterns mean, and each pattern that fits nothing."""
     known = element_names(circuit)
     found: list[str] = []
     faults = []
     for wanted in drop:
-        pattern = wanted.lower()
-        fitting = sorted(
-            name for name in known if name == pattern or fnmatchcase(name, _glob(pattern))
-        )
+        fitting = sorted(name for name in known if fits(name, wanted))
         if not fitting:
-            rule = f"must be an element of the circuit{did_you_mean(pattern, sorted(known))}"
+            near = did_you_mean(wanted.lower(), sorted(known))
+            rule = f"must be an element of the circuit{near}"
             faults.append(
                 Fault(source=source, line=None, where="--drop", wanted=rule, found=repr(wanted))
             )
         found += fitting
-    if faults:
-        raise InputError(faults)
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(found)), faults
 
 
-def _glob(pattern: str) -> str:
-    """Let only ``*`` stand for others: brackets are letters in a name."""
-    return pattern.replace("[", "[[]").replace("?", "[?]")
+def fits(name: str, wanted: str) -> bool:
+    """Tell whether a pattern means an element; only ``*`` stands for other letters.
+
+    Examples
+    --------
+    >>> fits("load.a[1]", "Load.a[1]"), fits("load.a1", "load.*"), fits("load.a1", "load.a?")
+    (True, True, False)
+    """
+    pattern = wanted.lower()
+    # brackets are letters in a name
+    return name == pattern or fnmatchcase(name, pattern.replace("[", "[[]").replace("?", "[?]"))
 
 
 def without(circuit: RawCircuit, dropped: Collection[str], findings: Findings) -> RawCircuit:
@@ -126,17 +127,31 @@ def without(circuit: RawCircuit, dropped: Collection[str], findings: Findings) -
     )
 
 
-def raise_refusals(circuit: RawCircuit, findings: Findings, source: str) -> None:
+def raise_refusals(
+    circuit: RawCircuit, findings: Findings, source: str, faults: Sequence[Fault] = ()
+) -> None:
     """Refuse everything at once: how much load each carries, and what to drop.
+
+    Parameters
+    ----------
+    faults
+        What was found before.
 
     Raises
     ------
     InputError
-        If anything was refused.
+        If anything was refused, or found before.
     """
+    told = [*faults, *_refusals(circuit, findings, source)]
+    if told:
+        raise InputError(told)
+
+
+def _refusals(circuit: RawCircuit, findings: Findings, source: str) -> list[Fault]:
+    """Return a fault for each class and reason, and one for all of them."""
     refused = findings.of("refused")
     if not refused:
-        return
+        return []
     total = fed_kw(circuit)
     groups: defaultdict[tuple[str, str], list[Finding]] = defaultdict(list)
     for row in refused:
@@ -158,7 +173,7 @@ def raise_refusals(circuit: RawCircuit, findings: Findings, source: str) -> None
         lost = _share(circuit, [row.element for row in refused], total)
         rule = f"without all {len(refused)} of them {lost} of the load goes"
         faults.append(Fault(source=source, line=None, where="together:", wanted=rule))
-    raise InputError(faults)
+    return faults
 
 
 def _share(circuit: RawCircuit, elements: Collection[str], total: float) -> str:

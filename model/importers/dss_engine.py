@@ -132,16 +132,21 @@ def tell(engine: Engine, commands: Iterable[str]) -> None:
         engine.context.Text.Command = command
 
 
-def solved_volts(engine: Engine, *, mode: str) -> tuple[dict[tuple[str, int], complex], bool]:
+def solved_volts(
+    engine: Engine, *, mode: str, told: Iterable[str] = ()
+) -> tuple[dict[tuple[str, int], complex], bool]:
     """Let the engine solve, its controls off, and return each node's voltage to earth.
 
     Parameters
     ----------
     mode
         ``snap`` with the loads' own laws, ``direct`` with nominal admittances.
+    told
+        Commands that bring the circuit into the state of interest, which a mode undoes in part.
     """
     options = ("controlmode=off", "tolerance=1e-8", "maxiterations=500", f"mode={mode}")
     tell(engine, (f"Set {option}" for option in options))
+    tell(engine, told)
     try:
         engine.circuit.Solution.Solve()
     except engine.refusal:

@@ -24,13 +24,14 @@ from .dss_choices import (
 )
 from .dss_lines import LineParts, line_parts
 from .dss_live import Node, live_nodes
-from .dss_loads import capacitor_of, der_of, loads_of
+from .dss_loads import LoadWork, capacitor_of, der_of, loads_of
 from .dss_names import Names, clean, letters
 from .dss_neutrals import neutrals_of
 from .dss_records import RawCircuit, RawReactor
 from .dss_regulators import regulators_of, with_tap_changer
 from .dss_script import Script, read_script
 from .dss_spans import is_series, spans_of
+from .dss_stars import add_stars
 from .dss_transformers import Banks, inline_parts
 from .findings import Findings
 
@@ -58,6 +59,7 @@ class _Build:
     circuit: RawCircuit
     live: set[Node]
     findings: Findings
+    faults: list[Fault]  #: of the input, beside what the findings refuse
     buses: Names = field(default_factory=Names)
     load_names: Names = field(default_factory=Names)
     inline: list[InlineTransformer] = field(default_factory=list)
@@ -95,7 +97,7 @@ def import_opendss(
     OpenPhaseError
         If the extra is not installed.
     """
-    script = read_script(path)
+    script = read_script(path, drop=drop)
     circuit, engine = read_apart(script, path.name)
     if solve_controls:
         settled_taps, settled_states = settle_apart(script, path.name)
@@ -108,9 +110,10 @@ def import_opendss(
     findings = Findings()
     if solve_controls:
         findings.note("taps and capacitor steps are those at which OpenDSS's controls settle")
-    dropped = chosen(circuit, drop, path.name)
+    dropped, faults = chosen(circuit, drop, path.name)
     circuit = without(circuit, dropped, findings)
-    build = _Build(circuit=circuit, live=live_nodes(circuit), findings=findings)
+    live = live_nodes(circuit)
+    build = _Build(circuit=circuit, live=live, findings=findings, faults=faults)
     feeder = _feeder(build, path.name)
     _note_names(build)
     return Imported(
@@ -133,10 +136,16 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
     for bus in sorted({bus for bus, _ in live}):
         build.buses.of(bus)
     _add_series(build)
-    for load in circuit.loads:
-        build.loads += loads_of(
-            load, circuit.load_mult, live, build.buses, build.load_names, findings
-        )
+    loads = LoadWork(
+        load_mult=circuit.load_mult,
+        live=live,
+        neutrals=neutrals_of(circuit),
+        buses=build.buses,
+        names=build.load_names,
+        findings=findings,
+    )
+    build.loads += [part for load in circuit.loads for part in loads_of(load, loads)]
+    build.loads += add_stars(loads.stars, build.buses, build.load_names, findings)
     names = Names()
     capacitors = [
         part
@@ -156,7 +165,7 @@ def _feeder(build: _Build, source_name: str) -> Feeder:
     for other in circuit.others:
         findings.add(other.kind, other.name, "refused", "a class that has no model")
     shunts = _shunts(build)
-    raise_refusals(circuit, findings, source_name)
+    raise_refusals(circuit, findings, source_name, build.faults)
     feeder = Feeder(
         name=clean(circuit.name).translate({ord("/"): "_", ord("\\"): "_"}).strip(".") or "circuit",
         source=source,
@@ -213,13 +222,18 @@ def _checked(feeder: Feeder) -> Feeder:
 def _source(build: _Build, source_name: str) -> Source:
     """Return the one source; further ones are refused.
 
+    It is a fault of the input if the circuit's own source is none of three phases, earthed and
+    in positive sequence.
+
     Raises
     ------
     InputError
-        If the circuit's own source is none of three phases, earthed and in positive sequence.
+        If there is none.
     """
     if not build.circuit.sources:
-        raise InputError.single(source_name, "vsource", None, "must be there: nothing feeds this")
+        wanted = "must be there: nothing feeds this"
+        fault = Fault(source=source_name, line=None, where="vsource", wanted=wanted)
+        raise InputError([*build.faults, fault])
     first, *others = build.circuit.sources
     for other in others:
         build.findings.add("vsource", other.name, "refused", "a second source")
@@ -233,13 +247,11 @@ def _source(build: _Build, source_name: str) -> Source:
         ("sequence must be pos", first.sequence, first.sequence.startswith("p")),
     ]
     where = f"vsource {first.name!r}"
-    faults = [
+    build.faults += [
         Fault(source=source_name, line=None, where=where, wanted=wanted, found=found)
         for wanted, found, right in told
         if not right
     ]
-    if faults:
-        raise InputError(faults)
     build.findings.add("vsource", first.name, "as it is")
     return Source(
         bus=build.buses.of(first.end.bus),

@@ -41,11 +41,6 @@ def line_parts(
     for span in merged(spans, in_line.keys(), findings):
         ends = [buses.of(bus) for bus in span.buses]
         _put_guards(span, ends, in_line.get(span.name, ()), buses, parts, findings)
-        if span.opened is not None:
-            _put_switch(span, ends, span.opened, span.name, False, buses, parts)
-            findings.note(
-                f"line {span.name} is open: a switch of that name, normally open, at its end"
-            )
         parts.lines.append(
             Line(
                 name=parts.names.of(span.name),
@@ -71,8 +66,9 @@ def _put_guards(
     parts: LineParts,
     findings: Findings,
 ) -> None:
-    """Put a closed switch where a fuse, recloser, relay or switch control stands."""
-    used = {span.opened}
+    """Put a switch where a line is open, and where a fuse, recloser or relay stands in it."""
+    whole = {end for end in (0, 1) if len(span.opened[end]) == len(span.nodes)}
+    used = set(whole)
     for guard in guards:
         terminal = guard.terminal - 1
         if terminal in used or terminal not in (0, 1):
@@ -81,28 +77,46 @@ def _put_guards(
             )
             continue
         used.add(terminal)
-        _put_switch(span, ends, terminal, guard.name, True, buses, parts)
-        findings.add(guard.kind, guard.name, "as it is", "a switch, closed")
+        _put_switch(span, ends, terminal, guard.name, buses, parts)
+        opened = letters(sorted(span.opened[terminal]))
+        how = f"a switch, open in {', '.join(opened)}" if opened else "a switch, closed"
+        findings.add(guard.kind, guard.name, "as it is", how)
+    for terminal in (0, 1):
+        if terminal in whole:
+            note = f"line {span.name} is open: a switch of that name, normally open, at its end"
+        elif span.opened[terminal] and terminal not in used:
+            opened = letters(sorted(span.opened[terminal]))
+            note = (
+                f"line {span.name} is open in {', '.join(opened)}: two switches at its end, "
+                f"normally open the one of that phase"
+            )
+        else:
+            continue
+        _put_switch(span, ends, terminal, span.name, buses, parts)
+        findings.note(note)
 
 
-def _put_switch(  # noqa: PLR0913 - what it puts, and where all is kept
-    span: Span,
-    ends: list[str],
-    terminal: int,
-    name: str,
-    closed: bool,
-    buses: Names,
-    parts: LineParts,
+def _put_switch(
+    span: Span, ends: list[str], terminal: int, name: str, buses: Names, parts: LineParts
 ) -> None:
-    """Put a switch between a bus and the line's end there, on a bus of its own."""
-    label = parts.switch_names.of(name)
-    outer, inner = ends[terminal], buses.new(f"{ends[terminal]}_{label}")
+    """Put a switch between a bus and the line's end there, on a bus of its own.
+
+    Where only some conductors are open there it is two switches, called after their phases too:
+    what hangs behind the open conductor stays, and is fed through loads and windings alone.
+    """
+    inner = buses.new(f"{ends[terminal]}_{clean(name)}")
+    start, end = (ends[terminal], inner) if terminal == 0 else (inner, ends[terminal])
     ends[terminal] = inner
-    start, end = (outer, inner) if terminal == 0 else (inner, outer)
-    phases = "".join(sorted(letters(span.nodes)))
-    parts.switches.append(
-        Switch(name=label, from_bus=start, to_bus=end, closed=closed, phases=phases)
-    )
+    opened = [node for node in span.nodes if node in span.opened[terminal]]
+    closed = [node for node in span.nodes if node not in opened]
+    for nodes, shut in ((closed, True), (opened, False)):
+        if nodes:
+            phases = letters(sorted(nodes))
+            wanted = f"{name}_{phases}" if opened and closed else name
+            label = parts.switch_names.new(clean(wanted))
+            parts.switches.append(
+                Switch(name=label, from_bus=start, to_bus=end, closed=shut, phases=phases)
+            )
 
 
 def _code(span: Span, parts: LineParts) -> LineCode:

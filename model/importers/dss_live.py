@@ -6,11 +6,12 @@ from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 
 from .dss_coils import coils_of
-from .dss_records import End, RawCircuit, RawLoad
+from .dss_records import End, RawCircuit, RawLine, RawLoad
 
 __all__ = ["Node", "element_names", "fed_kw", "live_nodes", "load_kw"]
 
 Node = tuple[str, int]
+_Ends = tuple[Node, Node]
 _Pair = tuple[str, Node, Node]
 
 _PHASES = (1, 2, 3)
@@ -19,13 +20,17 @@ _PHASES = (1, 2, 3)
 def live_nodes(circuit: RawCircuit, without: Collection[str] = ()) -> set[Node]:
     """Return the phase nodes that the source feeds, some elements taken away.
 
-    A transformer feeds the coils of its other windings where it has a voltage on one.
+    A transformer feeds the coils of its other windings where it has a voltage on one. Behind a
+    line's open conductor a phase counts as fed where another conductor of the line feeds that
+    end: loads and windings between the phases bring it a voltage.
     """
     joined: defaultdict[Node, list[Node]] = defaultdict(list)
     for element, start, end in _joins(circuit):
         if element not in without:
             joined[start].append(end)
             joined[end].append(start)
+    lines = [line for line in circuit.lines if f"line.{line.name}" not in without]
+    partly = [(closed, opened) for closed, opened in map(_closed_and_open, lines) if opened]
     waiting = [
         (source.end.bus, node)
         for source in circuit.sources
@@ -34,11 +39,28 @@ def live_nodes(circuit: RawCircuit, without: Collection[str] = ()) -> set[Node]:
     ]
     live = set(waiting)
     while waiting:
-        for far in joined[waiting.pop()]:
-            if far not in live:
-                live.add(far)
-                waiting.append(far)
+        while waiting:
+            for far in joined[waiting.pop()]:
+                if far not in live:
+                    live.add(far)
+                    waiting.append(far)
+        for closed, opened in partly:
+            if any(set(pair) <= live for pair in closed):
+                waiting += [node for pair in opened if live & set(pair) for node in pair]
+        waiting = [node for node in dict.fromkeys(waiting) if node not in live]
+        live.update(waiting)
     return live
+
+
+def _closed_and_open(line: RawLine) -> tuple[list[_Ends], list[_Ends]]:
+    """Return the ends of a line's phase conductors, of the closed and of the open ones."""
+    near, far = line.ends
+    cuts = [any(ends) for ends in zip(*line.opened, strict=True)]
+    found: tuple[list[_Ends], list[_Ends]] = ([], [])
+    for start, end, cut in zip(near.nodes, far.nodes, cuts, strict=True):
+        if start in _PHASES and end in _PHASES:
+            found[cut].append(((near.bus, start), (far.bus, end)))
+    return found
 
 
 def load_kw(load: RawLoad, load_mult: float) -> float:

@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from ..parts import Capacitor, Der, Load, LoadConnection, Place
 from .dss_live import Node, load_kw
 from .dss_names import Names, letters
+from .dss_neutrals import Neutrals
 from .dss_records import RawCapacitor, RawLoad, RawPlant
+from .dss_stars import Ray, Star, floating_neutral
 from .findings import Findings
 
-__all__ = ["capacitor_of", "der_of", "law_of", "loads_of"]
+__all__ = ["LoadWork", "capacitor_of", "der_of", "law_of", "loads_of"]
 
 _Branch = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadWork:
+    """What every load needs to be converted, and the stars found on the way."""
+
+    load_mult: float
+    live: Collection[Node]
+    neutrals: Neutrals
+    buses: Names
+    names: Names
+    findings: Findings
+    stars: defaultdict[Node, list[Star]] = field(default_factory=lambda: defaultdict(list))
 
 
 def law_of(raw: RawLoad) -> tuple[Load, str]:
@@ -57,17 +73,14 @@ def law_of(raw: RawLoad) -> tuple[Load, str]:
     return law, how
 
 
-def loads_of(
-    raw: RawLoad,
-    load_mult: float,
-    live: Collection[Node],
-    buses: Names,
-    names: Names,
-    findings: Findings,
-) -> list[Load]:
-    """Return what a load becomes, without its branches that nothing feeds."""
-    kw = load_kw(raw, load_mult)
-    kvar = raw.kvar * (1.0 if raw.fixed or raw.model in (6, 7) else load_mult)
+def loads_of(raw: RawLoad, work: LoadWork) -> list[Load]:
+    """Return what a load becomes, without its branches that nothing feeds.
+
+    Branches to a neutral that nothing earths are put among the work's stars instead.
+    """
+    findings = work.findings
+    kw = load_kw(raw, work.load_mult)
+    kvar = raw.kvar * (1.0 if raw.fixed or raw.model in (6, 7) else work.load_mult)
     if kw == 0.0 and kvar == 0.0:
         findings.add("load", raw.name, "as it is", "left out: no power")
         return []
@@ -78,36 +91,41 @@ def loads_of(
     if law.zip is not None:
         kw, kvar, law = _normal_zip(law, kw, kvar)
     hows = [how] if how else []
-    branches, branch_kv, floating = _branches(raw)
-    if floating:
+    branches, branch_kv = _branches(raw)
+    if not all(pair[0] in (1, 2, 3) for pair in branches):
+        findings.add("load", raw.name, "refused", "it has a branch on no phase", kw=kw)
+        return []
+    share = 1.0 / len(branches)
+    neutral = floating_neutral(raw, [q for _, q in branches], work.neutrals)
+    if neutral is None and any(q > 3 for _, q in branches):
         hows.append("its neutral conductor is taken as earthed")
+        branches = [(p, 0 if q > 3 else q) for p, q in branches]
     fed = [
-        branch
-        for branch in branches
-        if all((raw.end.bus, node) in live for node in branch if node > 0)
+        pair
+        for pair in branches
+        if all((raw.end.bus, node) in work.live for node in pair if node in (1, 2, 3))
     ]
     if not fed:
         findings.add("load", raw.name, "not fed", kw=kw)
         return []
-    if not all(node in (0, 1, 2, 3) for branch in fed for node in branch):
-        findings.add("load", raw.name, "refused", "it is connected to a neutral", kw=kw)
-        return []
     if len(fed) < len(branches):
         hows.append("without the phases that nothing feeds")
-    share = 1.0 / len(branches)
-    groups = _groups(fed)
+    if neutral is not None:
+        rays = tuple(Ray(phase=p, kva=complex(kw, kvar) * share, kv=branch_kv) for p, _ in fed)
+        work.stars[neutral].append(Star(load=raw, law=law, rays=rays, hows=tuple(hows), kw=kw))
+        return []
     rows = [
         replace(
             law,
-            name=names.of(raw.name if n == 0 else f"{raw.name}_{n + 1}"),
-            place=Place(bus=buses.of(raw.end.bus)),
+            name=work.names.of(raw.name if n == 0 else f"{raw.name}_{n + 1}"),
+            place=Place(bus=work.buses.of(raw.end.bus)),
             connection=connection,
             phases=phases,
             kw=kw * share * count,
             kvar=kvar * share * count,
             branch_kv=branch_kv,
         )
-        for n, (connection, phases, count) in enumerate(groups)
+        for n, (connection, phases, count) in enumerate(_groups(fed))
     ]
     fate = "approximated" if hows else "as it is"
     findings.add("load", raw.name, fate, "; ".join(hows) or f"model {raw.model}", kw=kw)  # type: ignore[arg-type]
@@ -129,8 +147,8 @@ def _normal_zip(law: Load, kw: float, kvar: float) -> tuple[float, float, Load]:
     return kw * (p or 1.0), kvar * (q or 1.0), replace(law, zip=(z, i, s, zq, iq, sq))
 
 
-def _branches(raw: RawLoad) -> tuple[list[_Branch], float, bool]:
-    """Return the nodes of each branch, its nominal voltage, and whether a neutral floats."""
+def _branches(raw: RawLoad) -> tuple[list[_Branch], float]:
+    """Return the nodes of each branch, a phase first, and its nominal voltage."""
     nodes = raw.end.nodes
     kv = raw.kv
     if raw.delta:
@@ -143,9 +161,7 @@ def _branches(raw: RawLoad) -> tuple[list[_Branch], float, bool]:
     else:
         kv = raw.kv / 3.0**0.5 if raw.phases > 1 else raw.kv
         pairs = [(node, nodes[raw.phases]) for node in nodes[: raw.phases]]
-    floating = any(node > 3 for pair in pairs for node in pair)
-    pairs = [tuple(0 if node > 3 else node for node in pair) for pair in pairs]  # type: ignore[misc]
-    return [pair if pair[0] > 0 else pair[::-1] for pair in pairs], kv, floating
+    return [pair if pair[0] in (1, 2, 3) else pair[::-1] for pair in pairs], kv
 
 
 def _groups(branches: Sequence[_Branch]) -> list[tuple[LoadConnection, str, int]]:

@@ -19,6 +19,8 @@ class Neutrals:
     conductors: frozenset[Node] = frozenset()  #: joined by a line's neutral conductor
     shared: frozenset[Node] = frozenset()  #: of more than one transformer winding
     reactors: frozenset[str] = frozenset()  #: names of the reactors that earth a neutral
+    loaded: frozenset[Node] = frozenset()  #: of loads
+    held: frozenset[Node] = frozenset()  #: joined by anything but loads
 
 
 def neutrals_of(circuit: RawCircuit) -> Neutrals:
@@ -36,13 +38,23 @@ def neutrals_of(circuit: RawCircuit) -> Neutrals:
         for winding in unit.windings:
             if not winding.delta:
                 uses[(winding.end.bus, winding.end.nodes[unit.phases])] += 1
+    conductors = frozenset(
+        (end.bus, node) for line in circuit.lines for end in line.ends for node in end.nodes
+    )
+    ends = [end for reactor in circuit.reactors for end in reactor.ends]
+    ends += [end for bank in circuit.capacitors for end in (bank.end, bank.far)]
+    ends += [end for other in circuit.others for end in other.ends]
+    ends += [winding.end for unit in circuit.transformers for winding in unit.windings]
+    joined = frozenset((end.bus, node) for end in ends for node in end.nodes)
     return Neutrals(
         earthing=dict(earthing),
-        conductors=frozenset(
-            (end.bus, node) for line in circuit.lines for end in line.ends for node in end.nodes
-        ),
+        conductors=conductors,
         shared=frozenset(node for node, count in uses.items() if count > 1 and node[1] > 3),
         reactors=frozenset(reactors),
+        loaded=frozenset(
+            (load.end.bus, node) for load in circuit.loads for node in load.end.nodes if node > 3
+        ),
+        held=conductors | joined,
     )
 
 
@@ -57,4 +69,7 @@ def neutral_ohm(winding: Winding, phases: int, neutrals: Neutrals) -> complex | 
             return 0j
         siemens.append(1.0 / winding.neutral_ohm)
     total = sum(siemens)
-    return 1.0 / total if total else None
+    if not total:
+        # what returns through a neutral that is earthed nowhere has it for its earth
+        return 0j if node in neutrals.loaded else None
+    return 1.0 / total

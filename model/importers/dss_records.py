@@ -115,6 +115,7 @@ class RawLoad:
     v_max_pu: float
     v_low_pu: float
     fixed: bool  #: no load multiplier applies
+    neutral_earthed: bool = False  #: by an impedance of its own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -187,7 +187,7 @@ def _jumper(reference: Reference, buses: tuple[str, str], spans: Sequence[Span])
         if (
             set(span.buses) == set(buses)
             and letters(span.nodes) == reference
-            and span.opened is None
+            and not any(span.opened)
         ):
             return span
     return None

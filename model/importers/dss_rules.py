@@ -21,6 +21,7 @@ __all__ = [
     "OPTIONS_REFUSED",
     "PROPERTIES_LEFT_OUT",
     "PROPERTIES_REFUSED",
+    "WITHOUT_MODEL",
 ]
 
 MAX_NAME_CHARS = 200
@@ -41,6 +42,9 @@ CLASSES_LEFT_OUT: dict[str, str] = dict.fromkeys(
     upfccontrol espvlcontrol"""),
     "only measures or controls",
 )
+
+WITHOUT_MODEL = tuple(word_list("isource vccs fault upfc indmach012 autotrans vsconverter"))
+"""Classes that the engine is given, for what they carry, but no part of a feeder stands for."""
 
 PROPERTIES_LEFT_OUT = frozenset(
     word_list("""yearly daily duty growth spectrum tyearly tdaily tduty cvrcurve effcurve p-tcurve

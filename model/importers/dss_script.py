@@ -10,13 +10,17 @@ is refused, all refusals at once.
 from __future__ import annotations
 
 import os
+import shlex
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import Fault, InputError
+from .dss_choices import fits
 from .dss_folder import Folder, NotReadError, TextFile
 from .dss_notes import Place
 from .dss_obey import obey
+from .dss_rules import CLASSES, WITHOUT_MODEL
 from .dss_state import Command, State
 
 __all__ = ["Command", "Script", "read_script"]
@@ -50,7 +54,7 @@ class Script:
     files: tuple[str, ...]
 
 
-def read_script(path: Path) -> Script:
+def read_script(path: Path, *, drop: Collection[str] = ()) -> Script:
     """Return the commands of an OpenDSS file and of the files it names.
 
     Nothing outside of the file's folder is read, but for catalogues such as line codes in a
@@ -61,6 +65,9 @@ def read_script(path: Path) -> Script:
     ----------
     path
         The main file.
+    drop
+        Elements that will be left out: where lines are refused, elements of classes without a
+        model are told with them, but for these.
 
     Raises
     ------
@@ -77,6 +84,8 @@ def read_script(path: Path) -> Script:
     reader.read(file, Place(main.name, None))
     if not state.has_circuit and not state.notes.faults:
         state.notes.refuse(Place(main.name, None), "", "defines no circuit")
+    if state.notes.faults:
+        _tell_classes(state, main.name, drop)
     state.notes.raise_if_any()
     return Script(
         commands=tuple(state.commands),
@@ -84,6 +93,23 @@ def read_script(path: Path) -> Script:
         ignored=state.notes.left_out(),
         files=tuple(reader.files),
     )
+
+
+def _tell_classes(state: State, file: str, drop: Collection[str]) -> None:
+    """Add to refused lines what an import would refuse next."""
+    for kind in WITHOUT_MODEL:
+        names = [
+            name
+            for name in state.names.get(CLASSES[kind], {})
+            if not any(fits(f"{kind}.{name}", pattern) for pattern in drop)
+        ]
+        if names:
+            drops = " ".join(f"--drop {shlex.quote(f'{kind}.{name}')}" for name in names)
+            rule = f"cannot be imported: a class that has no model; {drops}"
+            shown = ", ".join(map(repr, names[:5]))
+            more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+            fault = Fault(source=file, line=None, where=f"{kind} {shown}{more}", wanted=rule)
+            state.notes.faults.append(fault)
 
 
 @dataclass(slots=True, kw_only=True)

@@ -11,6 +11,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reactors import REACTOR
 from .dss_live import Node
 from .dss_records import Matrix, RawCircuit, RawLine, RawReactor
 from .findings import Fate, Findings
@@ -40,7 +41,7 @@ class Span:
     x_ohm: Real
     c_nf: Real
     build: str | None
-    opened: int | None = None  #: the end, 0 or 1, at which it is open
+    opened: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())  #: nodes open at either end
     also: tuple[str, ...] = field(default=())  #: lines of other phases that it took in
 
 
@@ -107,21 +108,19 @@ def _span(line: RawLine, unit_km: float, live: set[Node], findings: Findings) ->
     if not kept:
         findings.add("line", line.name, "refused", "it has neutral conductors alone")
         return None
-    ends = _ends_open(line, kept)
-    fed = [
-        n
-        for n in kept
-        if all((end.bus, near.nodes[n]) in live for end in line.ends)
-        and (ends is not None or not (line.opened[0][n] or line.opened[1][n]))
-    ]
-    if not fed or ends == 2:
+    fed = [n for n in kept if all((end.bus, near.nodes[n]) in live for end in line.ends)]
+    opened = tuple(tuple(near.nodes[n] for n in fed if line.opened[end][n]) for end in (0, 1))
+    if not fed or all(len(nodes) == len(fed) for nodes in opened):
         findings.add("line", line.name, "not fed")
         return None
-    findings.add("line", line.name, *_fate(line, kept, fed, neutral))
+    cut = [n for n in neutral if line.opened[0][n] or line.opened[1][n]]
+    findings.add("line", line.name, *_fate(line, kept, fed, neutral, cut))
     length = line.length * line.unit_m / 1000.0 if line.unit_m else line.length * unit_km
     if not line.unit_m and line.is_switch:
         length = _SHORT_KM
-    z = _kron((np.array(line.r_ohm) + 1j * np.array(line.x_ohm)) * line.length, neutral)
+    z = (np.array(line.r_ohm) + 1j * np.array(line.x_ohm)) * line.length
+    # a neutral conductor that is open carries nothing
+    z = _kron(z, [n for n in neutral if n not in cut], kept)
     pick = np.ix_([kept.index(n) for n in fed], [kept.index(n) for n in fed])
     return Span(
         name=line.name,
@@ -132,35 +131,34 @@ def _span(line: RawLine, unit_km: float, live: set[Node], findings: Findings) ->
         x_ohm=z.imag[pick],
         c_nf=(np.array(line.c_nf) * line.length)[np.ix_(fed, fed)],
         build=line.build,
-        opened=ends,
+        opened=(opened[0], opened[1]),
     )
 
 
-def _ends_open(line: RawLine, kept: Sequence[int]) -> int | None:
-    """Return the end at which all its phases are open, 2 for both, None for neither."""
-    near, far = (all(line.opened[end][n] for n in kept) for end in (0, 1))
-    if near and far:
-        return 2
-    return 0 if near else 1 if far else None
-
-
 def _fate(
-    line: RawLine, kept: Sequence[int], fed: Sequence[int], neutral: Sequence[int]
+    line: RawLine,
+    kept: Sequence[int],
+    fed: Sequence[int],
+    neutral: Sequence[int],
+    cut: Sequence[int],
 ) -> tuple[Fate, str]:
     """Say what became of a line that is there."""
     how = []
-    if neutral and any(node > 3 for end in line.ends for node in end.nodes):
+    if cut:
+        how.append("its neutral conductor is open: left out")
+    elif neutral and any(node > 3 for end in line.ends for node in end.nodes):
         how.append("its neutral conductor is reduced, taken as earthed at both ends")
     if len(fed) < len(kept):
         how.append("without the phases that nothing feeds")
     return ("approximated", "; ".join(how)) if how else ("as it is", "")
 
 
-def _kron(z: NDArray[np.complex128], neutral: Sequence[int]) -> NDArray[np.complex128]:
-    """Return the impedance without conductors that are earthed at both ends."""
+def _kron(
+    z: NDArray[np.complex128], neutral: Sequence[int], kept: Sequence[int]
+) -> NDArray[np.complex128]:
+    """Return the impedance of what is kept beside conductors that are earthed at both ends."""
     if not neutral:
-        return z
-    kept = [n for n in range(len(z)) if n not in neutral]
+        return np.asarray(z[np.ix_(kept, kept)])
     across = z[np.ix_(kept, neutral)]
     return z[np.ix_(kept, kept)] - across @ np.linalg.solve(z[np.ix_(neutral, neutral)], across.T)
 
@@ -168,7 +166,7 @@ def _kron(z: NDArray[np.complex128], neutral: Sequence[int]) -> NDArray[np.compl
 def _reactor_span(reactor: RawReactor, live: set[Node], findings: Findings) -> Span | None:
     """Return a reactor between two buses as a short line."""
     near, far = reactor.ends
-    name = f"reactor.{reactor.name}"
+    name = f"{REACTOR}{reactor.name}"
     if near.nodes != far.nodes or reactor.delta or not set(near.nodes) <= {1, 2, 3}:
         findings.add("reactor", reactor.name, "refused", "it joins different phases")
         return None
@@ -204,7 +202,7 @@ def merged(spans: Sequence[Span], alone: Collection[str], findings: Findings) ->
     found: list[Span] = []
     for group in beside.values():
         taken = [node for span in group for node in span.nodes]
-        free = all(span.opened is None and span.name not in alone for span in group)
+        free = all(not any(span.opened) and span.name not in alone for span in group)
         if len(group) > 1 and free and len(set(taken)) == len(taken):
             found.append(_joined(group))
             names = ", ".join(span.name for span in group)

@@ -70,6 +70,14 @@ def _as_imported(imported: Imported) -> Iterator[str]:
     for bank in imported.circuit.capacitors:
         states = " ".join(str(state) for state in bank.states)
         yield f'Edit "Capacitor.{bank.name}" States=[{states}]'
+    # the engine puts what a fuse or recloser switches back into its normal state
+    guarded = {guard.element for guard in imported.circuit.guards}
+    for line in imported.circuit.lines:
+        if f"line.{line.name}" in guarded:
+            for terminal, conductors in enumerate(line.opened, start=1):
+                for n, is_open in enumerate(conductors, start=1):
+                    word = "Open" if is_open else "Close"
+                    yield f'{word} "Line.{line.name}" {terminal} {n}'
 
 
 def _difference(imported: Imported, mode: str, solved: Volts) -> Difference:

@@ -11,6 +11,7 @@ from ..buses import bus_phases, bus_volts, fed_backwards, to_side_volts
 from ..errors import KeyPath, Report
 from ..parts import Capacitor, Der, Feeder, Line, Load, Place, Regulator, Switch, Transformer
 from ..phases import conductors, letters, phase_mask
+from ..reactors import is_reactor
 
 __all__ = ["check_phases", "check_volts"]
 
@@ -47,7 +48,10 @@ def check_phases(feeder: Feeder, report: Report) -> None:
                 rule = "must stand where three phases are"
                 report.add((table, index), rule, f"{letters(mask)} there")
     for index, point in enumerate(feeder.points):
-        if point.line in lines and lines[point.line].phases not in _ORDERS:
+        if point.line in lines and is_reactor(feeder, lines[point.line]):
+            rule = "must be a line: no measuring point stands on a series reactor"
+            report.add(("points", index, "line"), rule, repr(point.line))
+        elif point.line in lines and lines[point.line].phases not in _ORDERS:
             phases = lines[point.line].phases
             rule = (
                 "must be a line of three phases, whose sequence components a point measures:"

@@ -21,7 +21,7 @@ from .hanging import hang, why_not_hanging
 from .match import Match, by_name
 from .rows import OwnTable, Row, number_in, read_table
 
-__all__ = ["with_transformers"]
+__all__ = ["OwnConnections", "read_connections", "with_transformers"]
 
 UNKNOWN = "unknown"
 COLUMNS = ("unit", "connection", "rating_kva")
@@ -43,29 +43,45 @@ class _Said:
     rating_kva: float | None
 
 
-def with_transformers(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
-    """Give the feeder's three-phase transformers the connections of a CSV file.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnConnections:
+    """The table as it was read, names not looked up yet."""
 
-    The columns are ``unit``, ``connection`` and perhaps ``rating_kva``; leakage stays what it
-    is per unit. Names count as equal whatever their case, with or without ``transformer.``
-    before them. A connection is written as in the feeder file, or as a vector group (Dyn11), or
-    is ``unknown``: an in-line unit then becomes one that hangs on the feeder, whose connection a
-    study draws, if nothing but balanced loads lies behind it (`hanging`); otherwise it stays as it
-    is, and the match says why.
+    source: str
+    rows: tuple[_Said, ...]
+    ignored: tuple[str, ...]  #: columns without meaning here
+
+
+def read_connections(path: Path) -> OwnConnections:
+    """Read a CSV file that says how transformers are connected.
+
+    The columns are ``unit``, ``connection`` and perhaps ``rating_kva``. A connection is written as
+    in the feeder file, or as a vector group (Dyn11), or is ``unknown``.
 
     Raises
     ------
     InputError
-        With all faults of the file itself.
+        With all faults of the file.
     """
     table = read_table(path)
-    said = _read(table)
+    rows = _read(table)
+    return OwnConnections(source=table.name, rows=tuple(rows), ignored=table.others_than(COLUMNS))
+
+
+def with_transformers(feeder: Feeder, own: OwnConnections) -> tuple[Feeder, Match]:
+    """Give the feeder's three-phase transformers the connections of a table.
+
+    Leakage stays what it is per unit. Names count as equal whatever their case, with or without
+    ``transformer.`` before them. An in-line unit of ``unknown`` connection becomes one that hangs
+    on the feeder, whose connection a study draws, if nothing but balanced loads lies behind it
+    (`hanging`); otherwise it stays as it is, and the match says why.
+    """
     names = [unit.name for unit in feeder.inline_transformers]
     names += [unit.name for unit in feeder.transformers]
     joined: list[str] = []
     not_joined: list[tuple[str, str]] = []
     notes: list[str] = []
-    for row in said:
+    for row in own.rows:
         name = by_name(names, row.unit)
         why: str | None
         if name is None:
@@ -78,11 +94,10 @@ def with_transformers(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
             joined.append(name or "")
         else:
             not_joined.append((row.unit, why))
-    ignored = table.others_than(COLUMNS)
-    if ignored:
-        notes.append(f"columns without meaning here: {', '.join(ignored)}")
+    if own.ignored:
+        notes.append(f"columns without meaning here: {', '.join(own.ignored)}")
     return feeder, Match(
-        source=path.name,
+        source=own.source,
         what="transformers",
         joined=tuple(joined),
         not_joined=tuple(not_joined),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from ...model.parts import Feeder, Load
 from ...model.reading.fields import did_you_mean
 from ..spec.study_file import LoadDraw, MeasuredLoad
 from .match import Match, by_name
-from .readings import Readings, Unit, read_readings
+from .readings import Readings, Unit
 
 __all__ = ["with_peaks"]
 
@@ -45,7 +44,9 @@ class _Region:
     through_kva: Complex
 
 
-def with_peaks(feeder: Feeder, path: Path) -> tuple[Feeder, tuple[MeasuredLoad, ...], Match]:
+def with_peaks(
+    feeder: Feeder, readings: Readings
+) -> tuple[Feeder, tuple[MeasuredLoad, ...], Match]:
     """Scale the feeder's loads to what was measured, and say how a study draws them.
 
     A measured place, a measuring point or the source's bus, sees the loads beyond it; those that no
@@ -59,13 +60,7 @@ def with_peaks(feeder: Feeder, path: Path) -> tuple[Feeder, tuple[MeasuredLoad, 
     -------
     tuple
         The feeder, the levels for a study, and what was joined.
-
-    Raises
-    ------
-    InputError
-        With all faults of the file itself.
     """
-    readings = read_readings(path)
     known = measurable(feeder)
     values: dict[str, Real] = {}
     not_joined: list[tuple[str, str]] = []
@@ -111,7 +106,7 @@ def with_peaks(feeder: Feeder, path: Path) -> tuple[Feeder, tuple[MeasuredLoad, 
         notes.append(f"{rest} of {len(feeder.loads)} loads are seen by no joined row")
     scaled = tuple(_times(load, factor) for load, factor in zip(feeder.loads, scale, strict=True))
     match = Match(
-        source=path.name,
+        source=readings.source,
         what="measured places",
         joined=tuple(joined),
         not_joined=tuple(not_joined),

@@ -26,6 +26,8 @@ class Readings:
 
     Parameters
     ----------
+    source
+        The file.
     unit
         Amperes, the mean of the three phases, or kW of all three.
     hourly
@@ -37,6 +39,7 @@ class Readings:
         What else should be known.
     """
 
+    source: str
     unit: Unit
     hourly: bool
     values: dict[str, Real]
@@ -83,7 +86,13 @@ def _extremes(table: OwnTable) -> Readings:
             table.fault(row.line, f"column {least!r}", f"must be <= {most}", f"{low:g} of {high:g}")
         values[row.cells["point"]] = np.array([_or_nan(high), _or_nan(low)])
     ignored = table.others_than(("point", most, least))
-    return Readings(unit=unit, hourly=False, values=values, notes=_ignored(ignored))
+    return Readings(
+        source=table.name,
+        unit=unit,
+        hourly=False,
+        values=values,
+        notes=_ignored(ignored),
+    )
 
 
 def _hourly_columns(table: OwnTable) -> Readings:
@@ -96,7 +105,7 @@ def _hourly_columns(table: OwnTable) -> Readings:
         name: np.array([_or_nan(number_in(table, row, name.lower())) for row in table.rows])
         for name in names
     }
-    return _hourly(values)
+    return _hourly(table.name, values)
 
 
 def _hourly_rows(table: OwnTable) -> Readings:
@@ -115,10 +124,14 @@ def _hourly_rows(table: OwnTable) -> Readings:
         seen.add((time, point))
         own = values.setdefault(point, np.full(len(hours), np.nan))
         own[hours[time]] = _or_nan(number_in(table, row, "a"))
-    found = _hourly(values)
+    found = _hourly(table.name, values)
     ignored = _ignored(table.others_than(("time", "point", "a")))
     return Readings(
-        unit=found.unit, hourly=True, values=found.values, notes=(*found.notes, *ignored)
+        source=found.source,
+        unit=found.unit,
+        hourly=True,
+        values=found.values,
+        notes=(*found.notes, *ignored),
     )
 
 
@@ -132,7 +145,7 @@ def _check_times(table: OwnTable, times: Sequence[str]) -> None:
         seen.add(time)
 
 
-def _hourly(values: dict[str, Real]) -> Readings:
+def _hourly(source: str, values: dict[str, Real]) -> Readings:
     """Hourly amperes: an hour without any current is an outage or a dead meter, and left out."""
     notes = []
     hours = max((own.size for own in values.values()), default=0)
@@ -146,7 +159,7 @@ def _hourly(values: dict[str, Real]) -> Readings:
                 "are left out"
             )
     kept = {name: np.where(own > 0.0, own, np.nan) for name, own in values.items()}
-    return Readings(unit="a", hourly=True, values=kept, notes=tuple(notes))
+    return Readings(source=source, unit="a", hourly=True, values=kept, notes=tuple(notes))
 
 
 def _ignored(columns: Sequence[str]) -> tuple[str, ...]:

@@ -10,12 +10,13 @@ from typing import cast, get_args
 
 from ...model.parts import Feeder, Line, Point, Regulator, Switch, VoltageSide
 from ...model.points import fed_by_its_points
+from ...model.reactors import is_reactor
 from ...model.reading.fields import did_you_mean
 from ...model.zones import adjacent_sections, outwards
 from .match import Match, by_name
 from .rows import OwnTable, read_table
 
-__all__ = ["with_points"]
+__all__ = ["OwnPoints", "read_points", "with_points"]
 
 COLUMNS = ("name", "bus", "line", "voltage_side")
 PREFIXES = ("line.", "fuse.", "recloser.", "relay.", "swtcontrol.")
@@ -28,7 +29,8 @@ class _Where:
 
     buses: tuple[str, ...]
     lines: Mapping[str, Line]
-    at: Mapping[str, Sequence[Line]]  #: lines by either bus
+    reactors: frozenset[str]  #: names of lines on which no point stands
+    at: Mapping[str, Sequence[Line]]  #: other lines by either bus
     order: Mapping[str, int]  #: of buses as the source feeds them, one after the other
     across: Mapping[str, Sequence[str]]  #: buses beyond the closed switches of each
 
@@ -37,27 +39,43 @@ class _Where:
         return [bus, *self.across.get(bus, ())]
 
 
-def with_points(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
-    """Give the feeder the measuring points of a CSV file, and the sections between neighbours.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnPoints:
+    """The table as it was read, names not looked up yet."""
 
-    The columns are ``name`` and ``bus``, and perhaps ``line`` and ``voltage_side``. Without a line
-    the point stands on the only three-phase line that leads from the bus away from the source, or
-    at the end of the only one that ends there; a closed switch between the bus and the line, such
-    as a fuse, does not count. A ``line`` may also name a switch or a regulator of
-    the bus: the point then stands on the line behind it. These points take the place of all
-    that the feeder had.
+    source: str
+    rows: tuple[Point, ...]
+    ignored: tuple[str, ...]  #: columns without meaning here
+
+
+def read_points(path: Path) -> OwnPoints:
+    """Read a CSV file of measuring points.
+
+    The columns are ``name`` and ``bus``, and perhaps ``line`` and ``voltage_side``.
 
     Raises
     ------
     InputError
-        With all faults of the file itself.
+        With all faults of the file.
     """
     table = read_table(path)
     rows = _read(table)
+    return OwnPoints(source=table.name, rows=tuple(rows), ignored=table.others_than(COLUMNS))
+
+
+def with_points(feeder: Feeder, own: OwnPoints) -> tuple[Feeder, Match]:
+    """Give the feeder the measuring points of a table, and the sections between neighbours.
+
+    Without a line the point stands on the only three-phase line that leads from the bus away from
+    the source, or at the end of the only one that ends there; a closed switch between the bus and
+    the line, such as a fuse, does not count. A ``line`` may also name a switch or a regulator of
+    the bus: the point then stands on the line behind it. These points take the place of all that
+    the feeder had.
+    """
     where = _where(feeder)
     points: list[Point] = []
     not_joined: list[tuple[str, str]] = []
-    for point in rows:
+    for point in own.rows:
         found = _placed(feeder, where, point)
         taken = [p.name for p in points if isinstance(found, Point) and _same_place(p, found)]
         if isinstance(found, str):
@@ -76,11 +94,10 @@ def with_points(feeder: Feeder, path: Path) -> tuple[Feeder, Match]:
         notes.append(f"in no section, without a neighbour: {', '.join(alone)}")
     if feeder.points:
         notes.append(f"they take the place of the feeder's {len(feeder.points)} points")
-    ignored = table.others_than(COLUMNS)
-    if ignored:
-        notes.append(f"columns without meaning here: {', '.join(ignored)}")
+    if own.ignored:
+        notes.append(f"columns without meaning here: {', '.join(own.ignored)}")
     match = Match(
-        source=path.name,
+        source=own.source,
         what="measuring points",
         joined=tuple(point.name for point in points),
         not_joined=tuple(not_joined),
@@ -120,9 +137,11 @@ def _read(table: OwnTable) -> list[Point]:
 
 def _where(feeder: Feeder) -> _Where:
     at: defaultdict[str, list[Line]] = defaultdict(list)
+    reactors = frozenset(line.name for line in feeder.lines if is_reactor(feeder, line))
     for line in feeder.lines:
-        at[line.from_bus].append(line)
-        at[line.to_bus].append(line)
+        if line.name not in reactors:
+            at[line.from_bus].append(line)
+            at[line.to_bus].append(line)
     across: defaultdict[str, list[str]] = defaultdict(list)
     for switch in feeder.switches:
         if switch.closed:
@@ -133,6 +152,7 @@ def _where(feeder: Feeder) -> _Where:
     return _Where(
         buses=tuple(buses),
         lines={line.name: line for line in feeder.lines},
+        reactors=reactors,
         at=at,
         order=order,
         across=across,
@@ -174,6 +194,8 @@ def _on_line(where: _Where, line: Line, row: Point) -> Point | str:
     ends = [bus for bus in where.around(row.bus) if bus in (line.from_bus, line.to_bus)]
     if not ends:
         return f"line {line.name} does not end at {row.bus}"
+    if line.name in where.reactors:
+        return f"{line.name} is a series reactor; a point stands on a line"
     if len(line.phases) < 3:
         return f"line {line.name} has phases {line.phases} only; a point measures three"
     return replace(row, bus=ends[0], line=line.name)

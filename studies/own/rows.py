@@ -43,6 +43,11 @@ class OwnTable:
     rows: list[Row]
     faults: list[Fault] = field(default_factory=list)
 
+    @property
+    def name(self) -> str:
+        """The file without its folders."""
+        return Path(self.source).name
+
     def fault(self, line: int | None, where: str, wanted: str, found: str | None = None) -> None:
         """Note something wrong with the file."""
         self.faults.append(

@@ -21,8 +21,8 @@ def check_text(found: dict[str, Any]) -> str:
     """The summary for people, in 100 columns."""
     lines = [
         *wrapped(
-            f"{found['feeder']}: no faults; {_volts(found)}, {found['wires']} wires, "
-            f"neutral {found['neutral']}, {found['line_km']:.5g} km of line"
+            f"{found['feeder']}: no faults; {_volts(found)}, {_neutral(found)}, "
+            f"{found['line_km']:.5g} km of line"
             f"{_shares(found['line_km_by_phases'])}, "
             f"{found['load_kw']:g} kW, {len(found['points'])} measuring points"
         ),
@@ -44,6 +44,25 @@ def _volts(found: dict[str, Any]) -> str:
     at_points = [kv for kv in found["points_kv_ll"] if kv != found["kv_ll"]]
     source = f"{found['kv_ll']:g} kV"
     return f"{source} at the source, {_kv(at_points)} at the points" if at_points else source
+
+
+def _neutral(found: dict[str, Any]) -> str:
+    """Wires and neutral of the source, and at the points where those are others.
+
+    Examples
+    --------
+    >>> source = {"wires": 3, "neutral": "isolated"}
+    >>> _neutral({**source, "points_wires": [3], "points_neutral": ["isolated"]})
+    '3 wires, neutral isolated'
+    >>> _neutral({**source, "points_wires": [4], "points_neutral": ["solid"]})
+    '3 wires, neutral isolated at the source (4 wires, neutral solid at the points)'
+    """
+    source = f"{found['wires']} wires, neutral {found['neutral']}"
+    wires, neutrals = found["points_wires"], found["points_neutral"]
+    if not neutrals or (wires == [found["wires"]] and neutrals == [found["neutral"]]):
+        return source
+    points = f"{' and '.join(map(str, wires))} wires, neutral {' and '.join(neutrals)}"
+    return f"{source} at the source ({points} at the points)"
 
 
 def _kv(values: list[float]) -> str:

@@ -9,7 +9,7 @@ import pytest
 
 from openphase.model import load_feeder
 from openphase.model.network import CONNECTIONS, compile_network
-from openphase.model.neutrals import bus_neutrals, wires_at_unknown
+from openphase.model.neutrals import bus_earthings, bus_neutrals, wires_at_unknown
 from openphase.model.parts import InlineConnection, InlineTransformer, Place
 
 EARTHED = {"Yg/Yg", "Y/Yg", "D/Yg"}
@@ -68,3 +68,17 @@ def test_a_unit_behind_a_delta_is_never_taken_as_a_grounded_wye(
     network = compile_network(feeder)
     assumed = {3: "D/Yg", 4: "Yg/Yg"}[wires]
     assert network.connection[network.units.index(hung.name)] == CONNECTIONS[assumed]
+
+
+@pytest.mark.parametrize("ohm", [0j, 2 + 0j])
+@pytest.mark.parametrize("connection", [c for c in get_args(InlineConnection) if "/" in c])
+def test_what_feeds_a_bus_says_how_it_is_earthed(
+    connection: InlineConnection, ohm: complex
+) -> None:
+    paper = load_feeder("paper")
+    source = replace(paper.source, neutral="petersen", neutral_ohm=40j)
+    own = replace(unit(connection), from_bus=source.bus, to_neutral_ohm=ohm)
+    found = bus_earthings(replace(paper, source=source, inline_transformers=(own,)))
+    earthed = "impedance" if ohm else "solid"
+    assert found.pop("beyond") == (earthed if connection in EARTHED else "isolated")
+    assert set(found.values()) == {"petersen"}

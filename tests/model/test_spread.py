@@ -105,6 +105,24 @@ def test_a_regulator_at_the_head_belongs_to_the_substation():
     assert spread.inside == ()
 
 
+@pytest.mark.parametrize("imported", [None, "town.dss"])
+@pytest.mark.parametrize("at", [(0,), (5,), (9,), (0, 3, 4, 9)])
+def test_no_point_stands_on_a_series_reactor(at, imported):
+    plain = chain([1.0] * 10)
+    lines = tuple(
+        replace(own, name=f"reactor.{own.name}", length_km=0.001) if n in at else own
+        for n, own in enumerate(plain.lines)
+    )
+    spread = spread_points(replace(plain, lines=lines, imported_from=imported))
+    chosen = [point.line for point in spread.feeder.points]
+    assert len(chosen) == 4
+    assert len(spread.feeder.sections) == 3
+    if imported:
+        assert not any(name.startswith("reactor.") for name in chosen)
+    elif {0, 9} & set(at):
+        assert any(name.startswith("reactor.") for name in chosen)
+
+
 def test_few_lines_have_few_points_and_say_so():
     spread = spread_points(chain([1.0]))
     assert [(p.bus, p.line) for p in spread.feeder.points] == [("B0", "L0"), ("B1", "L0")]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from openphase.model import dump_feeder, feeder_from_toml, load_feeder, read_feeder
+from openphase.model import Feeder, dump_feeder, feeder_from_toml, load_feeder, read_feeder
 from openphase.studies.checking import summary
 from openphase.studies.cli import main
 from openphase.studies.show.check_text import check_text
@@ -244,3 +244,37 @@ def test_a_faulty_file_ends_with_all_its_faults(
     assert said.out == ""
     assert said.err.count("length_km must be > 0, got -5.0") == 2
     assert "Traceback" not in said.err
+
+
+def test_the_neutral_is_that_of_the_points() -> None:
+    ieee37, ieee13 = (
+        summary(load_feeder(name), default_study(name)) for name in ("ieee37", "ieee13")
+    )
+    assert (ieee37["wires"], ieee37["neutral"]) == (4, "solid")
+    assert (ieee37["points_wires"], ieee37["points_neutral"]) == ([3], ["isolated"])
+    said = " ".join(check_text(ieee37).split())
+    assert "4 wires, neutral solid at the source (3 wires, neutral isolated at the points)," in said
+    assert "4 wires, neutral solid, " in " ".join(check_text(ieee13).split())
+
+
+TRANSPOSED = "lines without a code are transposed"
+BALANCED = "what hangs behind transformers is balanced"
+DER = "DER are balanced"
+
+
+def test_only_what_the_feeder_has_is_assumed_of_it() -> None:
+    def assumed(feeder: Feeder) -> set[str]:
+        said = summary(feeder, default_study("none"))["assumed"]
+        return {TRANSPOSED, BALANCED, DER} & set(said)
+
+    everything = feeder_from_toml(EVERYTHING, "f")
+    passive = replace(everything, ders=())
+    bare = replace(
+        passive,
+        transformers=(),
+        loads=tuple(load for load in everything.loads if load.transformer is None),
+    )
+    assert assumed(everything) == {TRANSPOSED, BALANCED, DER}
+    assert assumed(passive) == {TRANSPOSED, BALANCED}
+    assert assumed(bare) == {TRANSPOSED}
+    assert assumed(load_feeder("ieee13")) == set()

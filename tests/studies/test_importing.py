@@ -73,6 +73,16 @@ def test_points_may_be_given(circuit: Path, capsys: pytest.CaptureFixture[str]) 
     assert "points.csv" in capsys.readouterr().out
 
 
+def test_a_reactor_at_the_head_has_no_measuring_point(circuit: Path) -> None:
+    text = CIRCUIT.replace(" bus1=s bus2=m ", " bus1=h bus2=m ")
+    circuit.write_text(text + "new reactor.head bus1=s bus2=h r=0.01 x=0.3\n", encoding="utf-8")
+    out = circuit.parent / "town.toml"
+    assert run("import", circuit, "-o", out) == 0
+    feeder = read_feeder(out)
+    assert "reactor.head" in {line.name for line in feeder.lines}
+    assert (feeder.points[0].bus, feeder.points[0].line) == ("h", "trunk")
+
+
 def test_a_reduced_feeder_says_its_error(circuit: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = circuit.parent / "town.toml"
     assert run("import", circuit, "-o", out, "--reduce", "--json") == 0
@@ -129,3 +139,51 @@ def test_folding_is_measured_down_to_the_least_load_that_was_measured(
     assert run("import", circuit, "-o", out, "--peaks", peaks, "--reduce", "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert told["reduction"]["measured"]["levels"] == pytest.approx([0.1, 1.0], rel=0.05)
+
+
+def test_faults_of_the_circuit_and_of_the_tables_come_in_one_round(
+    circuit: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = ("new isource.x bus1=m phases=3 amps=1", "edit vsource.source sequence=neg")
+    circuit.write_text("\n".join((CIRCUIT, *more, "")), encoding="utf-8")
+    tables = {
+        "transformers": "unit,connection\nmill,Dzn1\n",
+        "points": "name\nA\n",
+        "peaks": "point,max_a\nM1,-3\n",
+    }
+    words: list[object] = ["--drop", "line.trunc"]
+    for name, text in tables.items():
+        path = circuit.parent / f"{name}.csv"
+        path.write_text(text, encoding="utf-8")
+        words += [f"--{name}", path]
+    assert run("import", circuit, "-o", circuit.parent / "town.toml", *words) == 2
+    said = capsys.readouterr().err
+    for fault in (
+        "transformers.csv:2: column 'connection' must be one of",
+        "points.csv:1: column 'bus' must be there",
+        "peaks.csv:2: column 'max_a' must be a number >= 0",
+        "--drop must be an element of the circuit",
+        "sequence must be pos",
+        "--drop isource.x",
+        "6 faults",
+    ):
+        assert fault in said
+
+
+def test_lines_and_classes_that_are_refused_come_in_one_round(
+    circuit: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = (
+        "cd elsewhere",
+        "new isource.x bus1=m phases=3 amps=1",
+        "new isource.y bus1=m phases=3 amps=1",
+        "new autotrans.z phases=3 buses=(m n)",
+    )
+    circuit.write_text("\n".join((CIRCUIT, *more, "")), encoding="utf-8")
+    words = ("-o", circuit.parent / "town.toml", "--points", circuit.parent / "none.csv")
+    assert run("import", circuit, *words, "--drop", "ISource.*") == 2
+    said = capsys.readouterr().err
+    assert "leaves the circuit's files" in said
+    assert "autotrans 'z' cannot be imported: a class that has no model; --drop autotrans.z" in said
+    assert "none.csv" in said
+    assert "isource" not in said

@@ -315,6 +315,19 @@ def test_refusals_come_all_at_once_with_their_load_and_how_to_drop_them(tmp_path
 
 
 @needs_engine
+def test_elements_of_every_class_that_hold_no_numbers_come_at_once(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as refused:
+        imported(
+            tmp_path,
+            "new load.l bus1=m kv=12.47 kw=3 vminpu=(1 0 /)",
+            "new transformer.t windings=2 buses=[m b] kvs=[12.47 4.16] %noloadloss=(1 0 /)",
+        )
+    text = str(refused.value)
+    assert "load 'l' must hold finite numbers" in text
+    assert "transformer 't' must hold finite numbers" in text
+
+
+@needs_engine
 def test_dropping_what_was_refused_is_enough(tmp_path: Path) -> None:
     found = imported(tmp_path, *REFUSED, drop=DROPPED)
     assert [row.element for row in found.findings.of("dropped")] == list(DROPPED)

@@ -8,7 +8,7 @@ from oracles.trees import SOURCE, line, plain_load
 from openphase.model.buses import bus_volts
 from openphase.model.errors import InputError
 from openphase.model.parts import Capacitor, Feeder, InlineTransformer, Place, Transformer
-from openphase.studies.own.connections import with_transformers
+from openphase.studies.own.connections import read_connections, with_transformers
 from openphase.studies.own.match import match_json, match_text
 
 
@@ -74,7 +74,7 @@ def table(tmp_path, text):
 
 def test_names_match_whatever_their_case_and_prefix(tmp_path):
     text = "unit,connection\nMILL,Yg/D\ntransformer.network,Dyn11\nhung,Δ/Yg\nnone such,D/D\n"
-    feeder, match = with_transformers(FEEDER, table(tmp_path, text))
+    feeder, match = with_transformers(FEEDER, read_connections(table(tmp_path, text)))
     units = {own.name: own for own in feeder.inline_transformers}
     assert units["Mill"].connection == "Yg/D"
     assert (units["network"].connection, units["network"].shift) == ("D/Yg", "lead")
@@ -88,7 +88,9 @@ def test_names_match_whatever_their_case_and_prefix(tmp_path):
 
 
 def test_an_unknown_unit_hangs_on_the_feeder_and_its_loads_take_what_they_took(tmp_path):
-    feeder, match = with_transformers(FEEDER, table(tmp_path, "unit,connection\nmill,unknown\n"))
+    feeder, match = with_transformers(
+        FEEDER, read_connections(table(tmp_path, "unit,connection\nmill,unknown\n"))
+    )
     assert match.joined == ("Mill",)
     hung = feeder.transformers[-1]
     assert (hung.name, hung.connection, hung.place) == ("Mill", "unknown", Place(bus="B1"))
@@ -108,7 +110,9 @@ def test_a_load_rated_at_another_voltage_keeps_its_power_at_the_nominal_one(tmp_
     own = delta("b", "X", branch_kv=0.44, kw=50.0, kvar=20.0, exponent=1.0, exponent_q=2.0)
     feeder = replace(FEEDER, loads=(own,))
     v = bus_volts(feeder)["X"] * 3.0**0.5 / 440.0
-    hung, _ = with_transformers(feeder, table(tmp_path, "unit,connection\nmill,unknown\n"))
+    hung, _ = with_transformers(
+        feeder, read_connections(table(tmp_path, "unit,connection\nmill,unknown\n"))
+    )
     load = hung.loads[0]
     assert load.kw == pytest.approx(50.0 * v)
     reactive = load.kw * (1.0 / load.power_factor**2 - 1.0) ** 0.5
@@ -125,7 +129,9 @@ def test_a_load_rated_at_another_voltage_keeps_its_power_at_the_nominal_one(tmp_
     ],
 )
 def test_what_cannot_be_unknown_stays_and_says_why(tmp_path, name, why):
-    feeder, match = with_transformers(FEEDER, table(tmp_path, f"unit,connection\n{name},unknown\n"))
+    feeder, match = with_transformers(
+        FEEDER, read_connections(table(tmp_path, f"unit,connection\n{name},unknown\n"))
+    )
     assert feeder == FEEDER
     assert match.joined == ()
     assert why in match.not_joined[0][1]
@@ -135,7 +141,7 @@ def test_ratings_are_taken_and_neutral_ohms_go_with_the_neutral(tmp_path):
     earthed = unit("Mill", "X", "Yg/Yg", from_neutral_ohm=5.0 + 0j, to_neutral_ohm=0.1 + 0j)
     feeder = replace(FEEDER, inline_transformers=(earthed,))
     text = "unit,connection,rating_kva,owner\nmill,D/Yg,750,us\n"
-    told, match = with_transformers(feeder, table(tmp_path, text))
+    told, match = with_transformers(feeder, read_connections(table(tmp_path, text)))
     own = told.inline_transformers[0]
     assert own.rating_kva == 750.0
     assert (own.from_neutral_ohm, own.to_neutral_ohm) == (0j, 0.1 + 0j)
@@ -145,7 +151,7 @@ def test_ratings_are_taken_and_neutral_ohms_go_with_the_neutral(tmp_path):
 
 def test_a_unit_is_told_once(tmp_path):
     text = "unit,connection\nmill,Yg/D\nMill,D/D\n"
-    feeder, match = with_transformers(FEEDER, table(tmp_path, text))
+    feeder, match = with_transformers(FEEDER, read_connections(table(tmp_path, text)))
     assert feeder.inline_transformers[0].connection == "Yg/D"
     assert match.not_joined == (("Mill", "an earlier row speaks of that unit"),)
 
@@ -169,6 +175,6 @@ def test_a_unit_is_told_once(tmp_path):
 )
 def test_faults_of_the_file_are_all_told_at_once(tmp_path, text, faults):
     with pytest.raises(InputError) as raised:
-        with_transformers(FEEDER, table(tmp_path, text))
+        with_transformers(FEEDER, read_connections(table(tmp_path, text)))
     for fault in faults:
         assert fault in str(raised.value)

@@ -15,6 +15,7 @@ from openphase.model.reading.feeder_file import dump_feeder
 from openphase.studies.own.levels import measured_study_text
 from openphase.studies.own.match import match_text
 from openphase.studies.own.peaks import with_peaks
+from openphase.studies.own.readings import read_readings
 from openphase.studies.run.cases import make_case
 from openphase.studies.run.classes import DrawClass, Purpose
 from openphase.studies.run.draw import BlockId, draw_scenarios
@@ -81,7 +82,9 @@ def test_the_scaled_feeder_takes_what_was_measured(tmp_path, seed):
     feeder = replace(feeder, loads=loads, capacitors=(bank,))
     rows = measured_rows(feeder, rng)
     text = "point,max_a,min_a\n" + "".join(f"{n},{a!r},{b!r}\n" for n, a, b in rows)
-    scaled, measured, match = with_peaks(feeder, table(tmp_path, text.replace("np.float64", "")))
+    scaled, measured, match = with_peaks(
+        feeder, read_readings(table(tmp_path, text.replace("np.float64", "")))
+    )
     joined = {item.point for item in measured}
     assert set(match.joined) == joined
     assert joined | {name for name, _ in match.not_joined} == {name for name, _, _ in rows}
@@ -122,7 +125,7 @@ def chain(*kw, pf=0.9):
 def test_kw_are_taken_as_they_are_and_kvar_goes_along(tmp_path):
     feeder = chain(100.0, 300.0)
     text = "point,max_kw,min_kw\nP0,1000,150\np1,600,60\n"
-    scaled, measured, _ = with_peaks(feeder, table(tmp_path, text))
+    scaled, measured, _ = with_peaks(feeder, read_readings(table(tmp_path, text)))
     assert [load.kw for load in scaled.loads] == pytest.approx([400.0, 600.0])
     assert [item.level for item in measured] == [
         Uniform(low=pytest.approx(90.0 / 400.0), high=1.0),
@@ -143,8 +146,8 @@ def test_hours_become_quantiles_and_both_forms_agree(tmp_path):
         f"{n},P0,{a:.6f}\n{n},P1,{b:.6f}\n" for n, (a, b) in enumerate(zip(near, far, strict=True))
     )
     feeder = chain(100.0, 300.0)
-    scaled, measured, match = with_peaks(feeder, table(tmp_path, wide))
-    again, likewise, _ = with_peaks(feeder, table(tmp_path, tall))
+    scaled, measured, match = with_peaks(feeder, read_readings(table(tmp_path, wide)))
+    again, likewise, _ = with_peaks(feeder, read_readings(table(tmp_path, tall)))
     assert (again.loads, likewise) == (scaled.loads, measured)
     there = np.delete(np.arange(hours), 7)
     for item, amps, load in zip(
@@ -159,7 +162,7 @@ def test_hours_become_quantiles_and_both_forms_agree(tmp_path):
 
 def test_the_sources_bus_stands_for_all(tmp_path):
     scaled, measured, match = with_peaks(
-        chain(100.0, 300.0), table(tmp_path, "point,max_kw\nb0,800\n")
+        chain(100.0, 300.0), read_readings(table(tmp_path, "point,max_kw\nb0,800\n"))
     )
     assert [load.kw for load in scaled.loads] == pytest.approx([200.0, 600.0])
     assert [(m.point, m.level) for m in measured] == [("B0", Uniform(low=0.25, high=1.0))]
@@ -171,7 +174,7 @@ def test_what_cannot_be_joined_says_why(tmp_path):
     feeder = chain(100.0, 300.0, 50.0)
     feeder = replace(feeder, loads=(feeder.loads[0], feeder.loads[2]))
     text = "point,max_kw,min_kw\nP0,60,1\nP1,90,\nP2,70,9\nnowhere,5,1\n"
-    scaled, measured, match = with_peaks(feeder, table(tmp_path, text))
+    scaled, measured, match = with_peaks(feeder, read_readings(table(tmp_path, text)))
     why = dict(match.not_joined)
     assert "no measuring point" in why["nowhere"]
     assert "no load lies between" in why["P1"]
@@ -194,7 +197,7 @@ def test_what_cannot_be_joined_says_why(tmp_path):
 )
 def test_faults_of_the_file_are_told(tmp_path, text, faults):
     with pytest.raises(InputError) as raised:
-        with_peaks(chain(100.0), table(tmp_path, text))
+        with_peaks(chain(100.0), read_readings(table(tmp_path, text)))
     for fault in faults[:1] if "nan" in text else faults:
         assert fault.replace("line", "number") in str(raised.value)
 
@@ -207,7 +210,7 @@ BLOCK = BlockId(seed=1, purpose=Purpose.TRAIN, attempt=1, drawn=DrawClass.LOAD_S
 def test_a_study_draws_each_place_within_what_was_measured(tmp_path):
     paper = load_feeder("paper")
     text = "point,max_kw,min_kw\nR2,900,90\nR5,700,350\n"
-    scaled, measured, _ = with_peaks(paper, table(tmp_path, text))
+    scaled, measured, _ = with_peaks(paper, read_readings(table(tmp_path, text)))
     file = tmp_path / "own.toml"
     file.write_text(dump_feeder(scaled), encoding="utf-8")
     study_beside(file).write_text(measured_study_text(measured, "peaks.csv"), encoding="utf-8")

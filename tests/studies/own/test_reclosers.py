@@ -9,7 +9,7 @@ from oracles.trees import SOURCE, line, random_tree
 from openphase.model import load_feeder
 from openphase.model.errors import InputError
 from openphase.model.parts import Feeder, Point, Switch
-from openphase.studies.own.reclosers import with_points
+from openphase.studies.own.reclosers import read_points, with_points
 
 FEEDER = Feeder(
     name="own",
@@ -40,7 +40,7 @@ def table(tmp_path, text):
 
 def placed(tmp_path, *rows, feeder=FEEDER):
     text = "\n".join(["name,bus,line,voltage_side", *rows])
-    return with_points(feeder, table(tmp_path, text))
+    return with_points(feeder, read_points(table(tmp_path, text)))
 
 
 def test_points_stand_on_the_only_way_on_or_where_they_are_told(tmp_path):
@@ -121,6 +121,21 @@ def test_the_points_of_a_feeder_come_back_from_their_table(tmp_path, seed):
 )
 def test_faults_of_the_file_are_told(tmp_path, text, faults):
     with pytest.raises(InputError) as raised:
-        with_points(FEEDER, table(tmp_path, text))
+        with_points(FEEDER, read_points(table(tmp_path, text)))
     for fault in faults:
         assert fault in str(raised.value)
+
+
+def test_a_series_reactor_carries_no_point(tmp_path):
+    lines = tuple(
+        replace(own, name="reactor.choke") if own.name == "L2" else own for own in FEEDER.lines
+    )
+    feeder = replace(FEEDER, lines=lines, imported_from="own.dss")
+    _, match = placed(tmp_path, "on,B1,reactor.choke,", "way,B2,,", feeder=feeder)
+    assert dict(match.not_joined) == {
+        "on": "reactor.choke is a series reactor; a point stands on a line"
+    }
+    # the only line that is none leads on behind the recloser
+    assert match.joined == ("way",)
+    (point,) = placed(tmp_path, "way,B2,,", feeder=feeder)[0].points
+    assert (point.bus, point.line) == ("R", "last")
