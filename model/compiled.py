@@ -47,7 +47,7 @@ def _takes_record(function: Callable[P, R]) -> bool:
     return not _RECORDS.isdisjoint(str(kind) for kind in function.__annotations__.values())
 
 
-_RECORDS = frozenset({"Tree", "State", "Work"})
+_RECORDS = frozenset({"Tree", "State", "Work", "Wide", "Probes", "Answer"})
 
 
 def _compile(function: Callable[P, R], *, forceinline: bool, door: bool) -> Callable[P, R]:
@@ -62,10 +62,17 @@ def _compile(function: Callable[P, R], *, forceinline: bool, door: bool) -> Call
     config: Any = numba.config
     user_s, config.CACHE_DIR = config.CACHE_DIR, _FOLDER
     try:
-        jit = numba.njit(cache=bool(_FOLDER), **options)(function)
+        jit: Any = numba.njit(cache=bool(_FOLDER), **options)(function)
     finally:
         config.CACHE_DIR = user_s
+    template = jit.get_call_template
+    jit.get_call_template = lambda args, names: template(_any_value(args), names)
     return cast("Callable[P, R]", jit)
+
+
+def _any_value(args: Any) -> Any:
+    """Kinds of arguments without the values that constants have: else every value is compiled."""
+    return tuple(numba.types.unliteral(kind) for kind in args)
 
 
 def _code_folder() -> str:
