@@ -16,6 +16,7 @@ Real = NDArray[np.float64]
 SECANT_PASSES = 60  #: by then the secant has settled the loads, or it wanders
 PLAIN_PASSES = 260  #: by then plain steps have; what rounding still moves takes short ones
 SHORT_STEP = 0.35
+LEAST_SHARE = 0.05  #: of a gap that counts as error, whatever two passes show
 TINY = 1e-300  #: less than any voltage that counts
 
 
@@ -52,7 +53,7 @@ def update_magnitudes(tree: Tree, state: State, work: Work, s: int, passes: int)
         history[0, n] = value
         history[1, n] = gap
     if passes == 1:
-        work.follows[0] = 0.0
+        work.follows[0] = LEAST_SHARE
         return change / largest
     work.follows[0] = max(work.follows[0], solved / max(assumed - solved, solved, TINY))
     return change / largest * work.follows[0]

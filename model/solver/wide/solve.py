@@ -10,7 +10,7 @@ from ...lanes import WIDTH, bits_of, load_real, splat, store_real
 from ...states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from ..ladder import is_sourced
 from ..matrix3 import ZERO, plus, times
-from ..settle import is_steady, positive
+from ..settle import LEAST_SHARE, is_steady, positive
 from .climb import climb, mark_regions
 from .descend import descend, lift_neutrals, probe_current
 from .rows import Stack, in_lanes, load_matrix, load_triple, put_in_lane, store_triple
@@ -104,7 +104,7 @@ def begin(tree: Tree, state: State, wide: Wide, answer: Answer, chosen: Int) -> 
             wide.winding_v_pu[n, lane] = answer.winding_v_pu[n, scenario[lane]]
         store_real(wide.history, (0, n, 0), splat(0.0))
         store_real(wide.history, (1, n, 0), splat(0.0))
-    store_real(wide.follows, (0, 0), splat(0.0))
+    store_real(wide.follows, (0, 0), splat(LEAST_SHARE))
     linear = linear_loads(tree, wide)
     anew = ALL if tree.unit_node.size else 0
     for lane in range(WIDTH):
