@@ -75,14 +75,19 @@ def quiet_state(
     )
 
 
-def new_answer(network: Network, probes: Probes, scenarios: int) -> Answer:
-    """An empty answer whose fixed point starts from nominal voltages."""
+def new_answer(
+    network: Network,
+    probes: Probes,
+    scenarios: int,
+    start: NDArray[np.float64] | None = None,
+) -> Answer:
+    """An empty answer whose fixed point starts from nominal voltages, or from these (N, S)."""
     windings = 4 * (len(network.units) + 1) + network.tree.branch_load.size
     return Answer(
         v=np.empty((probes.v_node.size, 3, scenarios), np.complex128),
         i=np.empty((probes.i_edge.size, 3, scenarios), np.complex128),
         stub=np.empty((2, 3, scenarios), np.complex128),
-        winding_v_pu=np.ones((windings, scenarios)),
+        winding_v_pu=np.ones((windings, scenarios)) if start is None else np.array(start),
         machine_v1_v=np.zeros((network.machines.count, scenarios), np.complex128),
         flags=np.zeros(scenarios, np.int64),
         passes=np.zeros(scenarios, np.int64),
@@ -129,12 +134,12 @@ def solve(
     scenarios, tree = state.emf_pu.size, network.tree
     limits = tolerance_pu, MOST_PASSES, FLOOR_PU
     if tree.tail.size:
-        answer = new_answer(network, probes, scenarios)
-        answer.winding_v_pu[:] = 1.0 if start is None else start
+        answer = new_answer(network, probes, scenarios, start)
         solve_block(tree, state, probes, workspace(tree), answer, *limits)
         return answer
-    answer = new_answer(network, probes, scenarios)
-    answer.winding_v_pu[:] = 1.0 if start is None else start
+    answer = new_answer(network, probes, scenarios, start)
+    whole = np.ascontiguousarray
+    state = state._replace(load_scale=whole(state.load_scale), exponent=whole(state.exponent))
     order = np.lexsort((state.far_node, state.edge))
     solve_wide(
         tree, state, probes, wide_workspace(tree, probes), workspace(tree), answer, order, *limits

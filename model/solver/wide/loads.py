@@ -29,7 +29,7 @@ def load_admittance(tree: Tree, wide: Wide, n: int, v_pu: float, floor_pu: float
     if by_law == ALL:
         if tree.law_linear[n]:
             return nominal
-        real, imag = law_factors(tree.law, n, v_pu)
+        real, imag = law_factors(tree.law, wide.law_same[n], n, v_pu)
         return joined(nominal.real * real, nominal.imag * imag)
     if bits_of(exponent == 2.0) == ALL:
         return nominal
@@ -38,18 +38,22 @@ def load_admittance(tree: Tree, wide: Wide, n: int, v_pu: float, floor_pu: float
         return nominal * factor
     real = imag = splat(1.0)
     if not tree.law_linear[n]:
-        real, imag = law_factors(tree.law, n, v_pu)
+        real, imag = law_factors(tree.law, wide.law_same[n], n, v_pu)
     own = exponent < 0.0
     real, imag = select(own, real, factor), select(own, imag, factor)
     return joined(nominal.real * real, nominal.imag * imag)
 
 
 @compiled_apart
-def law_factors(law: Real, n: int, v_pu: float) -> tuple[float, float]:
-    """Conductance and susceptance over their nominal values, as ``assemble.law_factors``."""
+def law_factors(law: Real, same: bool, n: int, v_pu: float) -> tuple[float, float]:
+    """Conductance and susceptance over their nominal values, as ``assemble.law_factors``.
+
+    ``same``: the law has the same for both.
+    """
     least, most, low, beyond = law[n, 10], law[n, 11], law[n, 12], law[n, 13]
     v = smaller(larger(v_pu, splat(least)), splat(most))
-    real, imag = part_factor(law, n, 0, v), part_factor(law, n, 5, v)
+    real = part_factor(law, n, 0, v)
+    imag = real if same else part_factor(law, n, 5, v)
     under, over = v_pu < least, v_pu > most
     if beyond >= 0.0 and bits_of(under | over) != 0:
         real = select(under, splat(least ** (beyond - 2.0)), real)

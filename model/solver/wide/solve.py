@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled, compiled_door
-from ...lanes import WIDTH, bits_of, load_real, splat, store_real
+from ...lanes import WIDTH, bits_of, load_real, mask_of, select, splat, store_real
 from ...states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from ..ladder import is_sourced
 from ..matrix3 import ZERO, plus, times
@@ -20,6 +20,7 @@ from .work import ALL, Wide
 
 Int = NDArray[np.int64]
 Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
 
 __all__ = ["solve_wide"]
 
@@ -95,13 +96,10 @@ def begin(tree: Tree, state: State, wide: Wide, answer: Answer, chosen: Int) -> 
     scenario, last = wide.scenario, chosen.size - 1
     for lane in range(WIDTH):
         scenario[lane] = chosen[min(lane, last)]
-    for n in range(tree.load_unit.size):
-        for lane in range(WIDTH):
-            wide.load_scale[n, lane] = state.load_scale[n, scenario[lane]]
-            wide.exponent[n, lane] = state.exponent[n, scenario[lane]]
+    gather(state.load_scale, scenario, wide.load_scale)
+    gather(state.exponent, scenario, wide.exponent)
+    gather(answer.winding_v_pu, scenario, wide.winding_v_pu)
     for n in range(wide.winding_v_pu.shape[0]):
-        for lane in range(WIDTH):
-            wide.winding_v_pu[n, lane] = answer.winding_v_pu[n, scenario[lane]]
         store_real(wide.history, (0, n, 0), splat(0.0))
         store_real(wide.history, (1, n, 0), splat(0.0))
     store_real(wide.follows, (0, 0), splat(LEAST_SHARE))
@@ -120,6 +118,27 @@ def begin(tree: Tree, state: State, wide: Wide, answer: Answer, chosen: Int) -> 
     for side in range(2):
         store_triple(wide.stub, side, times(in_lanes(ZERO), (0j, 0j, 0j)))
     return linear, anew
+
+
+@compiled
+def side_by_side(scenario: Int) -> bool:
+    """Whether the lanes have scenarios that follow one another."""
+    following = True
+    for lane in range(1, WIDTH):
+        following &= scenario[lane] == scenario[lane - 1] + 1
+    return following
+
+
+@compiled
+def gather(given: Real, scenario: Int, out: Real) -> None:
+    """Some columns of (N, S) into lanes (N, WIDTH)."""
+    if side_by_side(scenario):
+        for n in range(out.shape[0]):
+            store_real(out, (n, 0), load_real(given, (n, scenario[0])))
+    else:
+        for n in range(out.shape[0]):
+            for lane in range(WIDTH):
+                out[n, lane] = given[n, scenario[lane]]
 
 
 @compiled
@@ -170,10 +189,17 @@ def write(
     bits, passes, fed = which
     v_node, i_edge, i_below = probes.v_node, probes.i_edge, probes.i_below
     current, scenario = wide.current, wide.scenario
-    for n in range(wide.winding_v_pu.shape[0]):
+    v_pu, own = wide.winding_v_pu, mask_of(bits)
+    following = side_by_side(scenario)
+    for n in range(v_pu.shape[0]):
+        if following:
+            past = load_real(answer.winding_v_pu, (n, scenario[0]))
+            value = select(own, load_real(v_pu, (n, 0)), past)
+            store_real(answer.winding_v_pu, (n, scenario[0]), value)
+            continue
         for lane in range(WIDTH):
             if bits >> lane & 1:
-                answer.winding_v_pu[n, scenario[lane]] = wide.winding_v_pu[n, lane]
+                answer.winding_v_pu[n, scenario[lane]] = v_pu[n, lane]
     for n in range(v_node.size):
         write_phasors(wide, bits, (wide.v, v_node[n]), answer.v, n)
     for n in range(i_edge.size):

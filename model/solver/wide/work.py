@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,7 @@ class Wide(NamedTuple):
     loose: NDArray[np.bool_]  #: (B,) the edge leaves modes loose
     kept: NDArray[np.bool_]  #: (B,) W and X of the edge are looked at
     keeps: NDArray[np.bool_]  #: (B,) what currents make of the voltage is noted on the way up
+    law_same: NDArray[np.bool_]  #: (L,) active and reactive power follow one law
     busy: Int  #: (B,) bits of the lanes in which something happens in the region there
     demand: Int  #: (1,) bits of the lanes that are eliminated anew
     scenario: Int  #: (WIDTH,) which one each lane has
@@ -94,6 +96,7 @@ def wide_workspace(tree: Tree, probes: Probes) -> Wide:
         loose=loose,
         kept=_kept(tree, probes, loose),
         keeps=_keeping(tree, loose),
+        law_same=np.all(tree.law[:, :5] == tree.law[:, 5:10], axis=1),
         busy=np.zeros(nodes, np.int64),
         demand=np.zeros(1, np.int64),
         scenario=np.zeros(WIDTH, np.int64),
@@ -102,42 +105,44 @@ def wide_workspace(tree: Tree, probes: Probes) -> Wide:
         far=np.zeros(WIDTH, np.int64),
         opened=np.zeros(3, np.int64),
         empty=np.zeros(3, np.int64),
-        load_scale=_aligned(loads),
-        exponent=_aligned(loads),
-        ratio=_aligned(tree.reference.shape[0], 3),
-        emf_pu=_aligned(1),
-        share=_aligned(1),
-        step_power=_aligned(1),
-        step_y=_aligned(1, 6),
-        between_y=_aligned(1, 6),
-        fallen_y=_aligned(1, 6),
-        y=_aligned(nodes, 18),
-        f=_aligned(nodes, 18),
-        w=_aligned(nodes, 18),
-        y_j=_aligned(nodes, 6),
-        h_j=_aligned(nodes, 6),
-        x_j=_aligned(nodes, 6),
-        own_f=_aligned(nodes, 18),
-        own_h=_aligned(nodes, 6),
-        top=_aligned(2, 18),
-        top_j=_aligned(1, 6),
-        v=_aligned(nodes + 1, 6),
-        here=_aligned(2, 18),
-        here_j=_aligned(2, 6),
-        event=_aligned(2, 18),
-        event_j=_aligned(2, 6),
-        event_y=_aligned(2, 18),
-        stub=_aligned(2, 6),
-        follows=_aligned(1),
-        turn=_aligned(1, 18),
-        current=_aligned(1, 6),
-        g=_aligned(units, 18),
-        g_j=_aligned(units, 6),
-        unit_y=_aligned(units, 6),
-        branch_y=_aligned(branches, 2),
-        branch_own=_aligned(branches, 2),
-        winding_v_pu=_aligned(windings),
-        history=_aligned(3, windings),
+        **_aligned(
+            load_scale=(loads,),
+            exponent=(loads,),
+            emf_pu=(1,),
+            share=(1,),
+            step_power=(1,),
+            step_y=(1, 6),
+            between_y=(1, 6),
+            fallen_y=(1, 6),
+            y=(nodes, 18),
+            f=(nodes, 18),
+            w=(nodes, 18),
+            y_j=(nodes, 6),
+            h_j=(nodes, 6),
+            x_j=(nodes, 6),
+            own_f=(nodes, 18),
+            own_h=(nodes, 6),
+            top=(2, 18),
+            top_j=(1, 6),
+            v=(nodes + 1, 6),
+            here=(2, 18),
+            here_j=(2, 6),
+            event=(2, 18),
+            event_j=(2, 6),
+            event_y=(2, 18),
+            stub=(2, 6),
+            follows=(1,),
+            turn=(1, 18),
+            current=(1, 6),
+            g=(units, 18),
+            g_j=(units, 6),
+            unit_y=(units, 6),
+            branch_y=(branches, 2),
+            branch_own=(branches, 2),
+            winding_v_pu=(windings,),
+            history=(3, windings),
+            ratio=(tree.reference.shape[0], 3),
+        ),
     )
 
 
@@ -178,9 +183,13 @@ def _keeping(tree: Tree, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return keeping | (tree.machine_unit.size > 0)
 
 
-def _aligned(*shape: int) -> NDArray[np.float64]:
-    """Zeros (..., WIDTH) that begin where a line of the cache does."""
-    size = int(np.prod(shape)) * WIDTH
-    room = np.zeros(size + ALIGNED // 8)
-    first = -room.ctypes.data // 8 % (ALIGNED // 8)
-    return room[first : first + size].reshape(*shape, WIDTH)
+def _aligned(**shapes: tuple[int, ...]) -> dict[str, Real]:
+    """Zeros (..., WIDTH) by name, each beginning where a line of the cache does."""
+    sizes = {name: prod(shape) * WIDTH for name, shape in shapes.items()}
+    room = np.zeros(sum(sizes.values()) + ALIGNED // 8)
+    at = -room.ctypes.data // 8 % (ALIGNED // 8)
+    parts = {}
+    for name, shape in shapes.items():
+        parts[name] = room[at : at + sizes[name]].reshape(*shape, WIDTH)
+        at += sizes[name]
+    return parts
