@@ -50,10 +50,17 @@ def _row(load: Load) -> list[float]:
         p, q = [*load.zip[:3], 2.0, 0.0], [*load.zip[3:], 2.0, 0.0]
     else:
         exponent_q = load.exponent if load.exponent_q is None else load.exponent_q
-        p, q = ([0.0, 0.0, 0.0, exponent, 1.0] for exponent in (load.exponent, exponent_q))
+        p, q = _of_exponent(load.exponent), _of_exponent(exponent_q)
     edge = -1.0 if load.edge_exponent is None else load.edge_exponent
     most = math.inf if load.v_max_pu is None else load.v_max_pu
     return [*p, *q, load.v_min_pu, most, load.v_low_pu or 0.0, edge]
+
+
+def _of_exponent(exponent: float) -> list[float]:
+    """Whole exponents are constant power, current or impedance, which cost no power function."""
+    if exponent in (0.0, 1.0, 2.0):
+        return [*(float(exponent == whole) for whole in (2.0, 1.0, 0.0)), 2.0, 0.0]
+    return [0.0, 0.0, 0.0, exponent, 1.0]
 
 
 def _is_impedance(law: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ Real = NDArray[np.float64]
 SECANT_PASSES = 60  #: by then the secant has settled the loads, or it wanders
 PLAIN_PASSES = 260  #: by then plain steps have; what rounding still moves takes short ones
 SHORT_STEP = 0.35
-LEAST_SHARE = 0.05  #: of a gap that counts as error, whatever two passes show
+LEAST_SHARE = 0.2  #: of a gap that counts as error, whatever two passes show
 TINY = 1e-300  #: less than any voltage that counts
 
 
