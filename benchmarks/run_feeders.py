@@ -26,7 +26,7 @@ from openphase.model.phases import phase_mask
 from openphase.model.solve import solve
 from openphase.model.states import NOT_CONVERGED, UNEARTHED, State
 from openphase.studies.run.engine import BLOCK, TOLERANCE_PU
-from openphase.studies.run.starting import fit_start, start_of
+from openphase.studies.run.starting import mean_voltages
 from openphase.studies.spec.study_file import default_study
 
 FEEDERS = ("ieee34", "ieee123")
@@ -82,13 +82,12 @@ def _timed(run: Callable[[], object]) -> float:
 def _product(problem: FeederProblem) -> Callable[[], None]:
     """Both states, block by block, started as a study starts them."""
     network, probes = problem.leaping, problem.probes
-    fitted = fit_start(problem.network, default_study(problem.feeder.name))
+    start = mean_voltages(problem.network, default_study(problem.feeder.name))
     parts = [slice(s, s + BLOCK) for s in range(0, SCENARIOS, BLOCK)]
     blocks = [(_some(problem.before, part), _some(problem.after, part)) for part in parts]
 
     def run() -> None:
         for before, after in blocks:
-            start = start_of(fitted, network, before)
             known = solve(network, before, probes, start=start, tolerance_pu=TOLERANCE_PU)
             none = np.zeros((0, before.emf_pu.size))
             solve_after(network, (before, known), after, (none, None), probes, TOLERANCE_PU)

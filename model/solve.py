@@ -87,11 +87,19 @@ def new_answer(
         v=np.empty((probes.v_node.size, 3, scenarios), np.complex128),
         i=np.empty((probes.i_edge.size, 3, scenarios), np.complex128),
         stub=np.empty((2, 3, scenarios), np.complex128),
-        winding_v_pu=np.ones((windings, scenarios)) if start is None else np.array(start),
+        winding_v_pu=_started(start, windings, scenarios),
         machine_v1_v=np.zeros((network.machines.count, scenarios), np.complex128),
         flags=np.zeros(scenarios, np.int64),
         passes=np.zeros(scenarios, np.int64),
     )
+
+
+def _started(
+    start: NDArray[np.float64] | None, windings: int, scenarios: int
+) -> NDArray[np.float64]:
+    if start is None:
+        return np.ones((windings, scenarios))
+    return np.broadcast_to(start, (windings, scenarios)).copy()
 
 
 def solve(
@@ -111,7 +119,7 @@ def solve(
         S scenarios.
     probes : Probes, optional
         Where to look; by default everywhere.
-    start : (N, S) array, optional
+    start : (N, S) or (N, 1) array, optional
         Winding and branch voltages in pu from which the loads' fixed point starts, such as
         ``winding_v_pu`` of the state before the event; by default nominal.
     tolerance_pu : float

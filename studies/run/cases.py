@@ -23,7 +23,7 @@ from ..spec.parts import Group as GroupSpec
 from ..spec.study_file import Study
 from .classes import DrawClass
 from .load_levels import load_places
-from .starting import Start, fit_start
+from .starting import mean_voltages
 
 __all__ = ["Case", "Group", "Sites", "Wired", "make_case", "make_cases"]
 
@@ -45,7 +45,7 @@ class Wired:
 
     network: Network
     points: Points
-    start: Start
+    start: NDArray[np.float64]  #: (W, 1) where the solver starts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,7 +70,7 @@ class Case:
     group: Group
     network: Network
     points: Points
-    start: Start
+    start: NDArray[np.float64]  #: (W, 1) where the solver starts
     ties: tuple[Wired, ...]  #: states that tie switching goes to and comes from
     transfers: tuple[Wired, ...]  #: and transfers
     places: Mapping[int, Sites]  #: on lines of at least so many phases
@@ -122,7 +122,7 @@ def _wire(feeder: Feeder, study: Study, state: GroupSpec | SwitchState) -> Wired
     motors = study.motors.share is not None
     network = compile_network(feeder, closed, opened, motors=motors)
     points = find_points(feeder, network, opened)
-    start = fit_start(network, study)
+    start = mean_voltages(network, study)
     return Wired(network=with_leaps(network, point_probes(points)), points=points, start=start)
 
 

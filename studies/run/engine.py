@@ -20,7 +20,6 @@ from ...model.states import Answer
 from .cases import Case, Wired
 from .draw import Scenarios
 from .draw_event import event_sides
-from .starting import start_of
 
 __all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "bounds_of", "observe"]
 
@@ -65,7 +64,7 @@ def observe(case: Case, scenarios: Scenarios, *options: Options) -> Observed:
         first.network,
         scenarios.before,
         point_probes(first.points),
-        start=start_of(first.start, first.network, scenarios.before),
+        start=first.start,
         tolerance_pu=TOLERANCE_PU,
     )
     after = solve_after(

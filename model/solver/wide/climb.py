@@ -199,14 +199,14 @@ def carry_lone(tree: Tree, wide: Wide, k: int, a: int) -> complex:
 def climb_whole(tree: Tree, wide: Wide, k: int) -> Matrix:
     """Past an edge, or a leap, of several phases, and what stands at its upper end; returns W."""
     y, q = load_matrix(wide.y, k), wide.leap[k]
-    if q < 0:
-        f, w = up(y, load(tree.z_ohm, k))
-    else:
+    f, w = up(y, series_of(tree, wide, k))
+    if wide.keeps[k]:
+        store_matrix(wide.z_f, k, f)
+    if q >= 0:
         chain = tree.leap_chain[q]
-        f, _ = up(y, load(chain, 1))
         f = product(f, load(chain, 0))
         w = add(product(transposed(load(chain, 0)), product(y, f)), load(chain, 2))
-    if q < 0 and turned(tree, k):
+    elif turned(tree, k):
         t = turn_of(tree, wide, k)
         f, w = product(f, t), product(transposed(t), product(w, t))
     store_matrix(wide.f, k, f)
@@ -214,32 +214,36 @@ def climb_whole(tree: Tree, wide: Wide, k: int) -> Matrix:
 
 
 @compiled
-def carry_whole(tree: Tree, wide: Wide, k: int) -> Vector:
-    """What is seen above such an edge of a current drawn below it.
-
-    It is F' of it where nothing has to be noted: what is passive is reciprocal.
-    """
-    if wide.keeps[k]:
-        return keep_ahead(tree, wide, k)
-    return times(transposed(load_matrix(wide.f, k)), load_triple(wide.y_j, k))
+def series_of(tree: Tree, wide: Wide, k: int) -> Matrix:
+    """The impedance of an edge or a leap."""
+    q = wide.leap[k]
+    return load(tree.z_ohm, k) if q < 0 else load(tree.leap_chain[q], 1)
 
 
 @compiled
-def keep_ahead(tree: Tree, wide: Wide, k: int) -> Vector:
-    """Note what a current drawn below makes of the voltage there; returns what is seen of it.
+def carry_whole(tree: Tree, wide: Wide, k: int) -> Vector:
+    """What is seen above such an edge of a current drawn below it.
 
-    F may have T in it; that of the impedance alone is made anew.
+    It is F' of it where all is reciprocal, as what is passive is.
     """
-    y, drawn, q = load_matrix(wide.y, k), load_triple(wide.y_j, k), wide.leap[k]
-    z = load(tree.z_ohm, k) if q < 0 else load(tree.leap_chain[q], 1)
-    f, _ = up(y, z)
-    ahead = minus(times(f, times(z, drawn)))
-    store_triple(wide.h_j, k, ahead)
-    drawn = plus(drawn, times(y, ahead))
+    drawn = load_triple(wide.y_j, k)
+    if wide.keeps[k]:
+        f, z = load_matrix(wide.z_f, k), series_of(tree, wide, k)
+        ahead = minus(times(f, times(z, drawn)))
+        store_triple(wide.h_j, k, ahead)
+        if not wide.reciprocal[0]:
+            return seen_through(tree, wide, k, plus(drawn, times(load_matrix(wide.y, k), ahead)))
+    return times(transposed(load_matrix(wide.f, k)), drawn)
+
+
+@compiled
+def seen_through(tree: Tree, wide: Wide, k: int, drawn: Vector) -> Vector:
+    """A current into the impedance of an edge or a leap, as seen above what stands there."""
+    q = wide.leap[k]
     if q >= 0:
         return times(transposed(load(tree.leap_chain[q], 0)), drawn)
     if turned(tree, k):
-        drawn = times(transposed(turn_of(tree, wide, k)), drawn)
+        return times(transposed(turn_of(tree, wide, k)), drawn)
     return drawn
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import WIDTH, bits_of, load_real, mask_of, select, splat, store_real
+from ...lanes import WIDTH, bits_of, joined, load_real, mask_of, select, splat, store_real
 from ...states import State, Tree, Work
 from ..assemble import add_machine, hang_bank
 from ..bank import D_YG, YG_D, YG_YG
@@ -76,8 +76,9 @@ def set_shunts(
     for k in range(y.shape[0]):
         a, passed = tree.lone_phase[k], tree.passed[k] >= 0
         if fed and not passed:
-            for i in range(6):
-                store_real(y_j, (k, i, 0), nothing)
+            for i in range(3):
+                if a < 0 or a == i:
+                    store_entry(y_j, k, i, joined(nothing, nothing))
         if not full or passed:
             continue
         if a >= 0:

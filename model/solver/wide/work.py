@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from math import prod
 from typing import NamedTuple
 
@@ -39,6 +40,7 @@ class Wide(NamedTuple):
     loose: NDArray[np.bool_]  #: (B,) the edge leaves modes loose
     kept: NDArray[np.bool_]  #: (B,) W and X of the edge are looked at
     keeps: NDArray[np.bool_]  #: (B,) what currents make of the voltage is noted on the way up
+    reciprocal: NDArray[np.bool_]  #: (1,)
     law_same: NDArray[np.bool_]  #: (L,) active and reactive power follow one law
     busy: Int  #: (B,) bits of the lanes in which something happens in the region there
     demand: Int  #: (1,) bits of the lanes that are eliminated anew
@@ -63,6 +65,7 @@ class Wide(NamedTuple):
     y_j: Stack  #: (B, 6, WIDTH)
     h_j: Stack  #: (B, 6, WIDTH)
     x_j: Stack  #: (B, 6, WIDTH)
+    z_f: Stack  #: (B, 18, WIDTH) F of the impedance alone, where ``keeps``
     own_f: Stack  #: (B, 18, WIDTH) F of each edge of a region, down to the upper stub
     own_h: Stack  #: (B, 6, WIDTH) what currents make of the voltage there
     top: Stack  #: (2, 18, WIDTH) W of a region, and what its charging differs by
@@ -86,16 +89,38 @@ class Wide(NamedTuple):
     history: Real  #: (3, N, WIDTH)
 
 
+class _Last(threading.local):
+    """What this thread used last."""
+
+    found: tuple[Tree, bytes, Wide] | None = None
+
+
+_LAST = _Last()
+
+
 def wide_workspace(tree: Tree, probes: Probes) -> Wide:
-    """Scratch for a network, and what the ladder must know of it beside its tree."""
+    """Scratch for a network, and what the ladder must know of it beside its tree.
+
+    A thread that solves with the same network again gets the same scratch again.
+    """
+    looked_at = probes.i_edge.tobytes()
+    last = _LAST.found
+    if last is None or last[0] is not tree or last[1] != looked_at:
+        last = _LAST.found = (tree, looked_at, _made(tree, probes))
+    return last[2]
+
+
+def _made(tree: Tree, probes: Probes) -> Wide:
     nodes, units, branches = tree.parent.size, tree.unit_node.size, tree.branch_node.size
     loads, windings = tree.load_unit.size, 4 * (units + 1) + branches
     loose = np.diff(tree.loose_from) > 0
+    keeps, reciprocal = _keeping(tree, loose)
     return Wide(
         *_visits(tree),
         loose=loose,
         kept=_kept(tree, probes, loose),
-        keeps=_keeping(tree, loose),
+        keeps=keeps,
+        reciprocal=np.array([reciprocal]),
         law_same=np.all(tree.law[:, :5] == tree.law[:, 5:10], axis=1),
         busy=np.zeros(nodes, np.int64),
         demand=np.zeros(1, np.int64),
@@ -120,6 +145,7 @@ def wide_workspace(tree: Tree, probes: Probes) -> Wide:
             y_j=(nodes, 6),
             h_j=(nodes, 6),
             x_j=(nodes, 6),
+            z_f=(nodes, 18),
             own_f=(nodes, 18),
             own_h=(nodes, 6),
             top=(2, 18),
@@ -169,18 +195,19 @@ def _kept(tree: Tree, probes: Probes, loose: NDArray[np.bool_]) -> NDArray[np.bo
     return kept
 
 
-def _keeping(tree: Tree, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Edges that have more than an impedance, and all where not everything is reciprocal."""
+def _keeping(tree: Tree, loose: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], bool]:
+    """Edges that have more than an impedance, or all; and whether everything is reciprocal."""
     edges = tree.parent.size
     keeping = loose | (tree.regulator[:edges] >= 0) | (tree.transformer[:edges] >= 0)
     keeping |= tree.leap >= 0
-    keeping[0] = True
-    for part in (tree.z_ohm[1:edges], tree.shunt_s):
-        if np.abs(part - part.swapaxes(1, 2)).max(initial=0.0) > 1e-12 * np.abs(part).max(
-            initial=0.0
-        ):
-            keeping[:] = True
-    return keeping | (tree.machine_unit.size > 0)
+    parts = (tree.z_ohm[:edges], tree.leap_chain[:, 1:].reshape(-1, 3, 3), tree.shunt_s)
+    reciprocal = tree.machine_unit.size == 0 and all(map(_symmetric, parts))
+    return keeping | (not reciprocal), reciprocal
+
+
+def _symmetric(matrices: NDArray[np.complex128]) -> bool:
+    odd = np.abs(matrices - matrices.swapaxes(1, 2)).max(initial=0.0)
+    return bool(odd <= 1e-12 * np.abs(matrices).max(initial=0.0))
 
 
 def _aligned(**shapes: tuple[int, ...]) -> dict[str, Real]:
