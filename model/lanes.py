@@ -31,6 +31,8 @@ __all__ = [
     "load_real",
     "magnitude_of",
     "mask_of",
+    "of_three",
+    "of_two",
     "power_of_two",
     "rounded",
     "select",
@@ -302,6 +304,70 @@ def joined(typing: Any, real: Any, imag: Any) -> Any:
         return own._getvalue()
 
     return types.complex128(types.float64, types.float64), plain
+
+
+def _fused(builder: Any, a: Any, b: Any, c: Any) -> Any:
+    """``a b + c``, rounded once."""
+    kind = a.type
+    name = "llvm.fma.f64" if isinstance(kind, ir.DoubleType) else f"llvm.fma.v{WIDTH}f64"
+    code = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(kind, [kind, kind, kind]), name
+    )
+    return builder.call(code, (a, b, c))
+
+
+def _sum_of_products(builder: Any, pairs: Any) -> Parts:
+    """Sum of complex products, all but the first product fused with the sum so far."""
+    real = imag = None
+    for a, b in pairs:
+        for x, y in ((a[0], b[0]), (builder.fneg(a[1]) if a[1] is not None else None, b[1])):
+            if x is not None and y is not None:
+                real = builder.fmul(x, y) if real is None else _fused(builder, x, y, real)
+        for x, y in ((a[0], b[1]), (a[1], b[0])):
+            if x is not None and y is not None:
+                imag = builder.fmul(x, y) if imag is None else _fused(builder, x, y, imag)
+    return real, imag
+
+
+def _plain_parts(context: Any, builder: Any, kind: Any, value: Any) -> Parts:
+    """Of a scalar, not spread over lanes."""
+    if isinstance(kind, types.Complex):
+        own = context.make_complex(builder, kind, value)
+        return own.real, own.imag
+    return value, None
+
+
+def _products(args: Any) -> Any:
+    """Typing and code of the sum of products of pairs of arguments."""
+    kinds = [_own(kind) for kind in args]
+    wide = any(kind in (REAL, LANES) for kind in kinds)
+    take = _parts if wide else _plain_parts
+
+    def code(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        parts = [take(context, builder, k, v) for k, v in zip(kinds, values, strict=True)]
+        pairs = zip(parts[::2], parts[1::2], strict=True)
+        found = _sum_of_products(builder, pairs)
+        if wide:
+            return _whole(context, builder, found)
+        own = context.make_complex(builder, types.complex128)
+        own.real, own.imag = found
+        return own._getvalue()
+
+    plain = all(kind in (REAL, types.float64) for kind in kinds)
+    out = (REAL if plain else LANES) if wide else types.complex128
+    return out(*kinds), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def of_three(typing: Any, a: Any, x: Any, b: Any, y: Any, c: Any, z: Any) -> Any:
+    """``a x + b y + c z`` of complex numbers, scalars or lanes."""
+    return _products((a, x, b, y, c, z))
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def of_two(typing: Any, a: Any, x: Any, b: Any, y: Any) -> Any:
+    """``a x + b y``."""
+    return _products((a, x, b, y))
 
 
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, where: Any) -> Any:

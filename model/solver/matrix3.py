@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..lanes import joined
+from ..lanes import joined, of_three, of_two
 
 __all__ = [
     "IDENTITY",
@@ -203,15 +203,15 @@ def plus_diagonal(a: Matrix, d: Vector) -> Matrix:
 def product(a: Matrix, b: Matrix) -> Matrix:
     """``a @ b``."""
     return (
-        a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
-        a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
-        a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
-        a[3] * b[0] + a[4] * b[3] + a[5] * b[6],
-        a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
-        a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
-        a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
-        a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
-        a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
+        of_three(a[0], b[0], a[1], b[3], a[2], b[6]),
+        of_three(a[0], b[1], a[1], b[4], a[2], b[7]),
+        of_three(a[0], b[2], a[1], b[5], a[2], b[8]),
+        of_three(a[3], b[0], a[4], b[3], a[5], b[6]),
+        of_three(a[3], b[1], a[4], b[4], a[5], b[7]),
+        of_three(a[3], b[2], a[4], b[5], a[5], b[8]),
+        of_three(a[6], b[0], a[7], b[3], a[8], b[6]),
+        of_three(a[6], b[1], a[7], b[4], a[8], b[7]),
+        of_three(a[6], b[2], a[7], b[5], a[8], b[8]),
     )
 
 
@@ -219,9 +219,9 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 def times(a: Matrix, v: Vector) -> Vector:
     """``a @ v``."""
     return (
-        a[0] * v[0] + a[1] * v[1] + a[2] * v[2],
-        a[3] * v[0] + a[4] * v[1] + a[5] * v[2],
-        a[6] * v[0] + a[7] * v[1] + a[8] * v[2],
+        of_three(a[0], v[0], a[1], v[1], a[2], v[2]),
+        of_three(a[3], v[0], a[4], v[1], a[5], v[2]),
+        of_three(a[6], v[0], a[7], v[1], a[8], v[2]),
     )
 
 
@@ -235,18 +235,19 @@ def reciprocal(x: complex) -> complex:
 @compiled
 def inverse(a: Matrix) -> Matrix:
     """``a^-1`` by cofactors."""
-    c0 = a[4] * a[8] - a[5] * a[7]
-    c3 = a[5] * a[6] - a[3] * a[8]
-    c6 = a[3] * a[7] - a[4] * a[6]
-    d = reciprocal(a[0] * c0 + a[1] * c3 + a[2] * c6)
+    m3, m6, m1, m2 = -a[3], -a[6], -a[1], -a[2]
+    c0 = of_two(a[4], a[8], -a[5], a[7])
+    c3 = of_two(a[5], a[6], m3, a[8])
+    c6 = of_two(a[3], a[7], m6, a[4])
+    d = reciprocal(of_three(a[0], c0, a[1], c3, a[2], c6))
     return (
         c0 * d,
-        (a[2] * a[7] - a[1] * a[8]) * d,
-        (a[1] * a[5] - a[2] * a[4]) * d,
+        of_two(a[2], a[7], m1, a[8]) * d,
+        of_two(a[1], a[5], m2, a[4]) * d,
         c3 * d,
-        (a[0] * a[8] - a[2] * a[6]) * d,
-        (a[2] * a[3] - a[0] * a[5]) * d,
+        of_two(a[0], a[8], m2, a[6]) * d,
+        of_two(a[2], a[3], -a[0], a[5]) * d,
         c6 * d,
-        (a[1] * a[6] - a[0] * a[7]) * d,
-        (a[0] * a[4] - a[1] * a[3]) * d,
+        of_two(a[1], a[6], -a[0], a[7]) * d,
+        of_two(a[0], a[4], m1, a[3]) * d,
     )
