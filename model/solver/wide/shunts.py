@@ -8,6 +8,7 @@ from ...states import State, Tree, Work
 from ..assemble import add_machine, hang_bank
 from ..bank import D_YG, YG_D, YG_YG
 from ..bank_forms import delta_wye, wye_delta, wye_wye
+from ..breaks import squared
 from ..matrix3 import ZERO, Matrix, load, store, store_vector, times
 from .loads import load_admittance
 from .rows import (
@@ -27,7 +28,8 @@ from .work import ALL, Wide
 
 __all__ = ["find_demand", "set_region_shunts", "set_shunts"]
 
-NEAR = 0.2  #: an admittance farther from the eliminated one than this share needs a new elimination
+NEAR = 1.0  #: an admittance farther from the eliminated one than this share needs a new elimination
+NEAR_BROKEN = 0.2  #: where loads alone hold the voltage behind an open phase
 
 
 @compiled
@@ -39,21 +41,16 @@ def find_demand(tree: Tree, wide: Wide, floor_pu: float) -> int:
     """
     at = 4 * (tree.unit_node.size + 1)
     v_pu, own_y, eliminated = wide.winding_v_pu, wide.branch_own, wide.branch_y
+    broken = mask_of(wide.opened[0] | wide.opened[1] | wide.opened[2])
+    near = select(broken, NEAR_BROKEN**2, splat(NEAR**2))
     demand = mask_of(0)
     for p in range(tree.branch_node.size):
         n = tree.branch_load[p]
         own = load_admittance(tree, wide, n, load_real(v_pu, (at + p, 0)), floor_pu)
         store_entry(own_y, p, 0, own)
         past = load_entry(eliminated, p, 0)
-        more = own - past
-        demand = demand | (size2(more) > NEAR**2 * size2(past))
+        demand = demand | (squared(own - past) > near * squared(past))
     return bits_of(demand)
-
-
-@compiled
-def size2(value: complex) -> float:
-    """``|value|**2``."""
-    return value.real * value.real + value.imag * value.imag
 
 
 @compiled

@@ -9,11 +9,21 @@ from ...compiled import compiled, compiled_door
 from ...lanes import WIDTH, bits_of, load_real, mask_of, select, splat, store_real
 from ...states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from ..ladder import is_sourced
-from ..matrix3 import ZERO, plus, times
+from ..matrix3 import ZERO, Vector, plus, times
 from ..settle import LEAST_SHARE, is_steady, positive
 from .climb import climb, mark_regions
 from .descend import descend, lift_neutrals, probe_current
-from .rows import Stack, in_lanes, load_matrix, load_triple, put_in_lane, store_triple
+from .rows import (
+    Stack,
+    chosen_vector,
+    in_lanes,
+    load_entry,
+    load_matrix,
+    load_triple,
+    put_in_lane,
+    store_entry,
+    store_triple,
+)
 from .settle import see_magnitudes, update_magnitudes
 from .shunts import find_demand, set_region_shunts, set_shunts
 from .work import ALL, Wide
@@ -82,8 +92,9 @@ def solve_wide(
                         wide.flags[lane] |= NOT_CONVERGED
                 found = ALL & ~settled
             if found:
-                write(tree, probes, wide, answer, (found, passes, fed))
+                keep(tree, probes, wide, (found, passes, fed))
             settled |= found
+        write(wide, answer)
 
 
 @compiled
@@ -179,55 +190,67 @@ def set_emf(tree: Tree, wide: Wide) -> None:
 
 
 @compiled
-def write(
-    tree: Tree, probes: Probes, wide: Wide, answer: Answer, which: tuple[int, int, bool]
-) -> None:
-    """Put the phasors of some lanes into the answer.
+def keep(tree: Tree, probes: Probes, wide: Wide, which: tuple[int, int, bool]) -> None:
+    """Keep what is looked at of some lanes.
 
     ``which``: their bits, the number of passes, and whether currents were fed in.
     """
     bits, passes, fed = which
-    v_node, i_edge, i_below = probes.v_node, probes.i_edge, probes.i_below
-    current, scenario = wide.current, wide.scenario
-    v_pu, own = wide.winding_v_pu, mask_of(bits)
-    following = side_by_side(scenario)
+    own, v_pu = mask_of(bits), wide.winding_v_pu
+    for lane in range(WIDTH):
+        if bits >> lane & 1:
+            wide.passes[lane] = passes
     for n in range(v_pu.shape[0]):
-        if following:
-            past = load_real(answer.winding_v_pu, (n, scenario[0]))
-            value = select(own, load_real(v_pu, (n, 0)), past)
-            store_real(answer.winding_v_pu, (n, scenario[0]), value)
-            continue
-        for lane in range(WIDTH):
-            if bits >> lane & 1:
-                answer.winding_v_pu[n, scenario[lane]] = v_pu[n, lane]
-    for n in range(v_node.size):
-        write_phasors(wide, bits, (wide.v, v_node[n]), answer.v, n)
-    for n in range(i_edge.size):
-        store_triple(current, 0, probe_current(tree, wide, i_edge[n], i_below[n], fed))
-        write_phasors(wide, bits, (current, 0), answer.i, n)
+        value = select(own, load_real(v_pu, (n, 0)), load_real(wide.seen_windings, (n, 0)))
+        store_real(wide.seen_windings, (n, 0), value)
+    for n in range(probes.v_node.size):
+        keep_phasors(wide.seen_v, n, bits, load_triple(wide.v, probes.v_node[n]))
+    for n in range(probes.i_edge.size):
+        current = probe_current(tree, wide, probes.i_edge[n], probes.i_below[n], fed)
+        keep_phasors(wide.seen_i, n, bits, current)
     for side in range(2):
-        write_phasors(wide, bits, (wide.stub, side), answer.stub, side)
+        keep_phasors(wide.seen_stub, side, bits, load_triple(wide.stub, side))
     for m in range(tree.machine_unit.size):
         unit = tree.machine_unit[m]
         windings = times(load_matrix(wide.g, unit), load_triple(wide.v, tree.unit_node[unit]))
         v1 = positive(plus(windings, load_triple(wide.g_j, unit)))
-        store_triple(current, 0, (v1, v1, v1))
-        for lane in range(WIDTH):
-            if bits >> lane & 1:
-                found = complex(current[0, 0, lane], current[0, 1, lane])
-                answer.machine_v1_v[m, scenario[lane]] = found
-    for lane in range(WIDTH):
-        if bits >> lane & 1:
-            answer.flags[scenario[lane]] = wide.flags[lane]
-            answer.passes[scenario[lane]] = passes
+        past = load_entry(wide.seen_machine, m, 0)
+        store_entry(wide.seen_machine, m, 0, select(own, v1, past))
 
 
 @compiled
-def write_phasors(wide: Wide, bits: int, given: tuple[Stack, int], out: Complex, n: int) -> None:
-    """Three phases of some lanes into row n of (m, 3, S)."""
-    stack, k = given
-    for i in range(3):
-        for lane in range(WIDTH):
-            if bits >> lane & 1:
-                value = complex(stack[k, 2 * i, lane], stack[k, 2 * i + 1, lane])
-                out[n, i, wide.scenario[lane]] = value
+def keep_phasors(stack: Stack, n: int, bits: int, found: Vector) -> None:
+    """Three phases of some lanes into row n."""
+    store_triple(stack, n, chosen_vector(mask_of(bits), found, load_triple(stack, n)))
+
+
+@compiled
+def write(wide: Wide, answer: Answer) -> None:
+    """Put all lanes into the answer."""
+    scenario, v_pu = wide.scenario, wide.seen_windings
+    if side_by_side(scenario):
+        for n in range(v_pu.shape[0]):
+            store_real(answer.winding_v_pu, (n, scenario[0]), load_real(v_pu, (n, 0)))
+    else:
+        for n in range(v_pu.shape[0]):
+            for lane in range(WIDTH):
+                answer.winding_v_pu[n, scenario[lane]] = v_pu[n, lane]
+    write_phasors(wide.seen_v, scenario, answer.v)
+    write_phasors(wide.seen_i, scenario, answer.i)
+    write_phasors(wide.seen_stub, scenario, answer.stub)
+    seen = wide.seen_machine
+    for lane in range(WIDTH):
+        s = scenario[lane]
+        answer.flags[s], answer.passes[s] = wide.flags[lane], wide.passes[lane]
+        for m in range(seen.shape[0]):
+            answer.machine_v1_v[m, s] = complex(seen[m, 0, lane], seen[m, 1, lane])
+
+
+@compiled
+def write_phasors(stack: Stack, scenario: Int, out: Complex) -> None:
+    """Three phases of all lanes into (m, 3, S)."""
+    for n in range(out.shape[0]):
+        for i in range(3):
+            for lane in range(WIDTH):
+                value = complex(stack[n, 2 * i, lane], stack[n, 2 * i + 1, lane])
+                out[n, i, scenario[lane]] = value

@@ -41,6 +41,7 @@ class Wide(NamedTuple):
     kept: NDArray[np.bool_]  #: (B,) W and X of the edge are looked at
     keeps: NDArray[np.bool_]  #: (B,) what currents make of the voltage is noted on the way up
     reciprocal: NDArray[np.bool_]  #: (1,)
+    branch_over: Real  #: (P,) one over its nominal volts
     law_same: NDArray[np.bool_]  #: (L,) active and reactive power follow one law
     busy: Int  #: (B,) bits of the lanes in which something happens in the region there
     demand: Int  #: (1,) bits of the lanes that are eliminated anew
@@ -79,7 +80,13 @@ class Wide(NamedTuple):
     stub: Stack  #: (2, 6, WIDTH)
     follows: Real  #: (1, WIDTH)
     turn: Stack  #: (1, 18, WIDTH) T of a regulator
-    current: Stack  #: (1, 6, WIDTH) at a probe
+    current: Stack  #: (1, 6, WIDTH) scratch
+    seen_v: Stack  #: (probes, 6, WIDTH) as the pass that settled each lane found it, like the next
+    seen_i: Stack  #: (probes, 6, WIDTH)
+    seen_stub: Stack  #: (2, 6, WIDTH)
+    seen_windings: Stack  #: (N, WIDTH)
+    seen_machine: Stack  #: (M, 2, WIDTH)
+    passes: Int  #: (WIDTH,)
     g: Stack  #: (U, 18, WIDTH)
     g_j: Stack  #: (U, 6, WIDTH)
     unit_y: Stack  #: (U, 6, WIDTH) loads across the LV windings
@@ -103,7 +110,7 @@ def wide_workspace(tree: Tree, probes: Probes) -> Wide:
 
     A thread that solves with the same network again gets the same scratch again.
     """
-    looked_at = probes.i_edge.tobytes()
+    looked_at = probes.i_edge.tobytes() + probes.v_node.tobytes()
     last = _LAST.found
     if last is None or last[0] is not tree or last[1] != looked_at:
         last = _LAST.found = (tree, looked_at, _made(tree, probes))
@@ -121,6 +128,7 @@ def _made(tree: Tree, probes: Probes) -> Wide:
         kept=_kept(tree, probes, loose),
         keeps=keeps,
         reciprocal=np.array([reciprocal]),
+        branch_over=1.0 / tree.branch_v,
         law_same=np.all(tree.law[:, :5] == tree.law[:, 5:10], axis=1),
         busy=np.zeros(nodes, np.int64),
         demand=np.zeros(1, np.int64),
@@ -130,6 +138,7 @@ def _made(tree: Tree, probes: Probes) -> Wide:
         far=np.zeros(WIDTH, np.int64),
         opened=np.zeros(3, np.int64),
         empty=np.zeros(3, np.int64),
+        passes=np.zeros(WIDTH, np.int64),
         **_aligned(
             load_scale=(loads,),
             exponent=(loads,),
@@ -160,6 +169,11 @@ def _made(tree: Tree, probes: Probes) -> Wide:
             follows=(1,),
             turn=(1, 18),
             current=(1, 6),
+            seen_v=(probes.v_node.size, 6),
+            seen_i=(probes.i_edge.size, 6),
+            seen_stub=(2, 6),
+            seen_windings=(windings,),
+            seen_machine=(tree.machine_unit.size, 2),
             g=(units, 18),
             g_j=(units, 6),
             unit_y=(units, 6),
