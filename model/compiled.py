@@ -72,7 +72,8 @@ def _compile(function: Callable[P, R], *, forceinline: bool, door: bool) -> Call
 
 def _any_value(args: Any) -> Any:
     """Kinds of arguments without the values that constants have: else every value is compiled."""
-    return tuple(numba.types.unliteral(kind) for kind in args)
+    types: Any = numba.types
+    return tuple(types.unliteral(kind) for kind in args)
 
 
 def _code_folder() -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..lanes import joined, of_three, of_two
+from ..lanes.functions import joined, of_three, of_two
 
 __all__ = [
     "IDENTITY",

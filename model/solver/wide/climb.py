@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import WIDTH, mask_of
+from ...lanes.functions import mask_of
+from ...lanes.kinds import WIDTH
 from ...states import Tree
 from ..matrix3 import (
     ZERO,
@@ -64,7 +65,7 @@ def climb(tree: Tree, wide: Wide, full: bool, fed: bool, floor_pu: float) -> Non
     for k in range(wide.visit.size - 1, -1, -1):
         if wide.visit[k] == PASSED:
             continue
-        a, above = tree.lone_phase[k], wide.above[k]
+        a = tree.lone_phase[k]
         if wide.visit[k] == TWIG:
             if full:
                 put_matrix(wide, k, in_lanes(load(tree.leap_chain[wide.leap[k]], 2)))
@@ -82,13 +83,10 @@ def climb(tree: Tree, wide: Wide, full: bool, fed: bool, floor_pu: float) -> Non
                 put_matrix(wide, k, climb_whole(tree, wide, k))
             if fed:
                 put_drawn(wide, k, carry_whole(tree, wide, k))
-        if is_kept(wide, k):
-            if wide.busy[k]:
-                climb_region(tree, wide, k, full, fed, floor_pu)
-            if k and full:
-                add_matrix(wide.y, above, load_matrix(wide.w, k))
-            if k and fed:
-                add_vector(wide.y_j, above, load_triple(wide.x_j, k))
+        if wide.busy[k]:
+            climb_region(tree, wide, k, full, fed, floor_pu)
+        if k and is_watched(wide, k):
+            hand_up(wide, k, full, fed)
 
 
 @compiled
@@ -126,15 +124,25 @@ def climb_region(tree: Tree, wide: Wide, k: int, full: bool, fed: bool, floor_pu
 
 
 @compiled
-def is_kept(wide: Wide, k: int) -> bool:
+def hand_up(wide: Wide, k: int, full: bool, fed: bool) -> None:
+    """W and X of edge k, where they were kept, to the node above."""
+    above = wide.above[k]
+    if full:
+        add_matrix(wide.y, above, load_matrix(wide.w, k))
+    if fed:
+        add_vector(wide.y_j, above, load_triple(wide.x_j, k))
+
+
+@compiled
+def is_watched(wide: Wide, k: int) -> bool:
     """Whether W and X of edge k are looked at before they go up."""
-    return wide.kept[k] or wide.busy[k] != 0
+    return bool(wide.watched[k] or wide.busy[k] != 0)
 
 
 @compiled
 def put_matrix(wide: Wide, k: int, w: Matrix) -> None:
     """W of edge k, to where it is kept or else to the node above."""
-    if is_kept(wide, k):
+    if is_watched(wide, k):
         store_matrix(wide.w, k, w)
     else:
         add_matrix(wide.y, wide.above[k], w)
@@ -143,7 +151,7 @@ def put_matrix(wide: Wide, k: int, w: Matrix) -> None:
 @compiled
 def put_drawn(wide: Wide, k: int, drawn: Vector) -> None:
     """X of edge k likewise."""
-    if is_kept(wide, k):
+    if is_watched(wide, k):
         store_triple(wide.x_j, k, drawn)
     else:
         add_vector(wide.y_j, wide.above[k], drawn)
@@ -151,8 +159,12 @@ def put_drawn(wide: Wide, k: int, drawn: Vector) -> None:
 
 @compiled
 def put_entry(wide: Wide, k: int, a: int, w: complex) -> None:
-    """W of an edge with a single phase; where kept, an event of earlier lanes may have left more."""
-    if is_kept(wide, k):
+    """W of an edge with a single phase.
+
+    Where it is kept an event of lanes before these may have left something in the other phases: a
+    leap that ends in one phase may pass lines that have more.
+    """
+    if is_watched(wide, k):
         store_matrix(wide.w, k, in_lanes(ZERO))
         store_entry(wide.w, k, 4 * a, w)
     else:
@@ -163,7 +175,7 @@ def put_entry(wide: Wide, k: int, a: int, w: complex) -> None:
 @compiled
 def put_drawn_entry(wide: Wide, k: int, a: int, drawn: complex) -> None:
     """X of an edge with a single phase, likewise."""
-    if is_kept(wide, k):
+    if is_watched(wide, k):
         store_triple(wide.x_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
         store_entry(wide.x_j, k, a, drawn)
     else:
@@ -202,7 +214,7 @@ def climb_whole(tree: Tree, wide: Wide, k: int) -> Matrix:
     """Past an edge, or a leap, of several phases, and what stands at its upper end; returns W."""
     y, q = load_matrix(wide.y, k), wide.leap[k]
     f, w = up(y, series_of(tree, wide, k))
-    if wide.keeps[k]:
+    if wide.notes[k]:
         store_matrix(wide.z_f, k, f)
     if q >= 0:
         chain = tree.leap_chain[q]
@@ -229,7 +241,7 @@ def carry_whole(tree: Tree, wide: Wide, k: int) -> Vector:
     It is F' of it where all is reciprocal, as what is passive is.
     """
     drawn = load_triple(wide.y_j, k)
-    if wide.keeps[k]:
+    if wide.notes[k]:
         f, z = load_matrix(wide.z_f, k), series_of(tree, wide, k)
         ahead = minus(times(f, times(z, drawn)))
         store_triple(wide.h_j, k, ahead)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import bits_of, joined, larger, mask_of, select, splat
+from ...lanes.functions import bits_of, joined, larger, mask_of, select, splat
 from ...states import Tree
 from ..breaks import FLOATING, NOTHING_S, SINGULAR, squared
 from ..matrix3 import (
@@ -86,10 +86,10 @@ def descend_lone(tree: Tree, wide: Wide, k: int, a: int, fed: bool) -> None:
 def descend_whole(tree: Tree, wide: Wide, k: int, fed: bool) -> None:
     """The voltage below an edge, or a leap, of several phases."""
     v = load_triple(wide.v, wide.above[k])
-    if fed and not wide.keeps[k]:
+    if fed and not wide.notes[k]:
         v = plus(v, minus(times(load(tree.z_ohm, k), load_triple(wide.y_j, k))))
     v = times(load_matrix(wide.f, k), v)
-    if fed and wide.keeps[k]:
+    if fed and wide.notes[k]:
         v = plus(v, load_triple(wide.h_j, k))
     store_triple(wide.v, k, v)
     keep_phases(wide.v, k, tree.node_phases[k])

@@ -7,7 +7,8 @@ the impedance above, no shunts and nothing open.
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import WIDTH, bits_of, larger, load_real, mask_of, select, splat
+from ...lanes.functions import bits_of, larger, load_real, mask_of, select, splat
+from ...lanes.kinds import WIDTH
 from ...states import UNEARTHED, Tree
 from ..breaks import DEAD, FLOATING, NOTHING_S, SINGULAR, UNDEFINED, squared
 from ..matrix3 import (
@@ -70,7 +71,8 @@ def climb_event(
 ) -> tuple[Matrix, Vector]:
     """Past edge n, the event of the lanes in ``bits`` on it; returns W and X above it.
 
-    A regulator or transformer stands only where no event is. What leads down again stays in ``own_f``, ``own_h`` and, of these lanes, in ``event``.
+    What leads down again stays in ``own_f``, ``own_h`` and, of these lanes, in ``event``. A
+    regulator or transformer stands only where no event is.
     """
     own, z, y = mask_of(bits), load(tree.z_ohm, n), load_matrix(wide.y, n)
     share = event_share(wide, bits, 1.0)
@@ -224,7 +226,7 @@ def replace_phase(wide: Wide, a: int, opened: int, zero: int) -> None:
 
 @compiled
 def free_modes(tree: Tree, wide: Wide, n: int, below: tuple[Matrix, Vector], bits: int) -> Modes:
-    """Let loose the modes of edge n at its lower end, as ``breaks.free_modes``; flags in ``bits``."""
+    """Let loose the modes of edge n, as ``breaks.free_modes``; flags in the lanes of ``bits``."""
     w, x = below
     store_matrix(wide.here, 0, w)
     limit = smallest_counted(wide)

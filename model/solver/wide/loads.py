@@ -3,15 +3,7 @@
 from __future__ import annotations
 
 from ...compiled import compiled, compiled_apart
-from ...lanes import (
-    bits_of,
-    joined,
-    larger,
-    load_real,
-    select,
-    smaller,
-    splat,
-)
+from ...lanes.functions import bits_of, joined, larger, load_real, select, smaller, splat
 from ...states import Tree
 from ..assemble import Real
 from .powers import power

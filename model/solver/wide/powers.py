@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import larger, power_of_two, rounded, select, smaller, splat, split_power
+from ...lanes.functions import larger, power_of_two, rounded, select, smaller, splat, split_power
 
 __all__ = ["power"]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ...lanes import joined, load_real, select, splat, store_real
+from ...lanes.functions import joined, load_real, select, splat, store_real
 from ..matrix3 import Matrix, Vector
 
 __all__ = [

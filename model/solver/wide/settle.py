@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import (
-    WIDTH,
+from ...lanes.functions import (
     bits_of,
     larger,
     load_real,
@@ -15,6 +14,7 @@ from ...lanes import (
     square_root,
     store_real,
 )
+from ...lanes.kinds import WIDTH
 from ...states import Tree
 from ..matrix3 import plus, times
 from ..settle import PLAIN_PASSES, SECANT_PASSES, SHORT_STEP, TINY, magnitude, positive
@@ -29,9 +29,7 @@ __all__ = ["see_magnitudes", "update_magnitudes"]
 
 
 @compiled
-def update_magnitudes(
-    tree: Tree, wide: Wide, bits: int, passes: int, tolerance_pu: float
-) -> int:
+def update_magnitudes(tree: Tree, wide: Wide, bits: int, passes: int, tolerance_pu: float) -> int:
     """Move the voltages towards the solved ones; returns the bits of the lanes that settled.
 
     Those of ``bits`` have, and stay where they are: another step would be one of rounding.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import WIDTH, bits_of, joined, load_real, mask_of, select, splat, store_real
+from ...lanes.functions import bits_of, joined, load_real, mask_of, select, splat, store_real
+from ...lanes.kinds import WIDTH
 from ...states import State, Tree, Work
 from ..assemble import add_machine, hang_bank
 from ..bank import D_YG, YG_D, YG_YG

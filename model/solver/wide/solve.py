@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled, compiled_door
-from ...lanes import WIDTH, bits_of, load_real, mask_of, select, splat, store_real
+from ...lanes.functions import bits_of, load_real, mask_of, select, splat, store_real
+from ...lanes.kinds import WIDTH
 from ...states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from ..ladder import is_sourced
 from ..matrix3 import ZERO, Vector, plus, times

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes import load_real
+from ...lanes.functions import load_real
 from ...states import Tree
 from ..matrix3 import IDENTITY, Matrix, load
 from .rows import add_entry, in_lanes, load_matrix, store_matrix

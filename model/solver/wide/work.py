@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import threading
 from math import prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...lanes import WIDTH
+from ...lanes.kinds import WIDTH
 from ...states import Probes, Tree
 from .rows import Stack
 
@@ -38,8 +38,8 @@ class Wide(NamedTuple):
     above: Int  #: (B,) the node above that is not passed by; B, the EMF's row, for node 0
     place: Int  #: (Q,) the node at which a leap is visited
     loose: NDArray[np.bool_]  #: (B,) the edge leaves modes loose
-    kept: NDArray[np.bool_]  #: (B,) W and X of the edge are looked at
-    keeps: NDArray[np.bool_]  #: (B,) what currents make of the voltage is noted on the way up
+    watched: NDArray[np.bool_]  #: (B,) W and X of the edge are looked at
+    notes: NDArray[np.bool_]  #: (B,) what currents make of the voltage is noted on the way up
     reciprocal: NDArray[np.bool_]  #: (1,)
     branch_over: Real  #: (P,) one over its nominal volts
     law_same: NDArray[np.bool_]  #: (L,) active and reactive power follow one law
@@ -66,7 +66,7 @@ class Wide(NamedTuple):
     y_j: Stack  #: (B, 6, WIDTH)
     h_j: Stack  #: (B, 6, WIDTH)
     x_j: Stack  #: (B, 6, WIDTH)
-    z_f: Stack  #: (B, 18, WIDTH) F of the impedance alone, where ``keeps``
+    z_f: Stack  #: (B, 18, WIDTH) F of the impedance alone, where ``notes``
     own_f: Stack  #: (B, 18, WIDTH) F of each edge of a region, down to the upper stub
     own_h: Stack  #: (B, 6, WIDTH) what currents make of the voltage there
     top: Stack  #: (2, 18, WIDTH) W of a region, and what its charging differs by
@@ -121,12 +121,12 @@ def _made(tree: Tree, probes: Probes) -> Wide:
     nodes, units, branches = tree.parent.size, tree.unit_node.size, tree.branch_node.size
     loads, windings = tree.load_unit.size, 4 * (units + 1) + branches
     loose = np.diff(tree.loose_from) > 0
-    keeps, reciprocal = _keeping(tree, loose)
+    notes, reciprocal = _noting(tree, loose)
     return Wide(
         *_visits(tree),
         loose=loose,
-        kept=_kept(tree, probes, loose),
-        keeps=keeps,
+        watched=_watched(tree, probes, loose),
+        notes=notes,
         reciprocal=np.array([reciprocal]),
         branch_over=1.0 / tree.branch_v,
         law_same=np.all(tree.law[:, :5] == tree.law[:, 5:10], axis=1),
@@ -201,22 +201,22 @@ def _visits(tree: Tree) -> tuple[Int, Int, Int, Int]:
     return visit, leap, above, place
 
 
-def _kept(tree: Tree, probes: Probes, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _watched(tree: Tree, probes: Probes, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Edges at probes, that of the source, and those that leave modes loose."""
-    kept = loose.copy()
-    kept[0] = True
-    kept[probes.i_edge] = True
-    return kept
+    watched = loose.copy()
+    watched[0] = True
+    watched[probes.i_edge] = True
+    return watched
 
 
-def _keeping(tree: Tree, loose: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], bool]:
+def _noting(tree: Tree, loose: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], bool]:
     """Edges that have more than an impedance, or all; and whether everything is reciprocal."""
     edges = tree.parent.size
-    keeping = loose | (tree.regulator[:edges] >= 0) | (tree.transformer[:edges] >= 0)
-    keeping |= tree.leap >= 0
+    noting = loose | (tree.regulator[:edges] >= 0) | (tree.transformer[:edges] >= 0)
+    noting |= tree.leap >= 0
     parts = (tree.z_ohm[:edges], tree.leap_chain[:, 1:].reshape(-1, 3, 3), tree.shunt_s)
     reciprocal = tree.machine_unit.size == 0 and all(map(_symmetric, parts))
-    return keeping | (not reciprocal), reciprocal
+    return noting | (not reciprocal), reciprocal
 
 
 def _symmetric(matrices: NDArray[np.complex128]) -> bool:
@@ -224,12 +224,12 @@ def _symmetric(matrices: NDArray[np.complex128]) -> bool:
     return bool(odd <= 1e-12 * np.abs(matrices).max(initial=0.0))
 
 
-def _aligned(**shapes: tuple[int, ...]) -> dict[str, Real]:
+def _aligned(**shapes: tuple[int, ...]) -> dict[str, Any]:
     """Zeros (..., WIDTH) by name, each beginning where a line of the cache does."""
     sizes = {name: prod(shape) * WIDTH for name, shape in shapes.items()}
     room = np.zeros(sum(sizes.values()) + ALIGNED // 8)
     at = -room.ctypes.data // 8 % (ALIGNED // 8)
-    parts = {}
+    parts: dict[str, Any] = {}
     for name, shape in shapes.items():
         parts[name] = room[at : at + sizes[name]].reshape(*shape, WIDTH)
         at += sizes[name]

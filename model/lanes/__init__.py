@@ -1,0 +1,1 @@
+"""Eight scenarios side by side: numbers of compiled code that fill a processor's vector."""
