@@ -51,9 +51,7 @@ def scenes_of(seed: int, scenarios: int) -> Scenes | None:
     return Scenes(network=network, before=before, after=after, der_factor=factor, rng=rng)
 
 
-def _scene(
-    rng: np.random.Generator, feeder: Feeder, network: Network
-) -> tuple[State, State, Real]:
+def _scene(rng: np.random.Generator, feeder: Feeder, network: Network) -> tuple[State, State, Real]:
     """One scenario: loads by their laws, of constant impedance, by exponents, or mixed."""
     loads = (len(network.loads), 1)
     own, drawn = network.exponent[:, None].copy(), rng.choice([0.0, 1.0, 2.0], loads)
