@@ -16,7 +16,7 @@ from openphase.model.solve import all_probes, solve
 from openphase.model.states import Answer, Probes, State
 
 FEEDERS = 100
-RARE = 1178  #: a feeder that shows it where currents drawn at one phase are left behind at another
+RARE = 838, 893, 1132  #: these show it where currents drawn at one phase are left behind at others
 SCENARIOS = 40
 
 Int = NDArray[np.int64]
@@ -62,7 +62,7 @@ def test_no_bit_depends_on_the_scenarios_beside():
     everyone = np.arange(SCENARIOS)
     wrong: list[tuple[int, list[str], list[int]]] = []
     seen, leapt, far, linear, machines = 0, 0, 0, 0, 0
-    for seed in (*range(FEEDERS), RARE):
+    for seed in (*range(FEEDERS), *RARE):
         scenes = scenes_of(seed, SCENARIOS)
         if scenes is None:
             continue
