@@ -159,8 +159,13 @@ def put_drawn(wide: Wide, k: int, drawn: Vector) -> None:
 
 @compiled
 def put_entry(wide: Wide, k: int, a: int, w: complex) -> None:
-    """W of an edge with a single phase."""
+    """W of an edge with a single phase.
+
+    Where it is kept an event of lanes before these may have left something in the other phases: a
+    leap that ends in one phase may pass lines that have more.
+    """
     if is_watched(wide, k):
+        store_matrix(wide.w, k, in_lanes(ZERO))
         store_entry(wide.w, k, 4 * a, w)
     else:
         above = wide.above[k]
@@ -169,8 +174,9 @@ def put_entry(wide: Wide, k: int, a: int, w: complex) -> None:
 
 @compiled
 def put_drawn_entry(wide: Wide, k: int, a: int, drawn: complex) -> None:
-    """X of an edge with a single phase."""
+    """X of an edge with a single phase, likewise."""
     if is_watched(wide, k):
+        store_triple(wide.x_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
         store_entry(wide.x_j, k, a, drawn)
     else:
         above = wide.above[k]

@@ -29,9 +29,12 @@ __all__ = ["see_magnitudes", "update_magnitudes"]
 
 
 @compiled
-def update_magnitudes(tree: Tree, wide: Wide, passes: int, tolerance_pu: float) -> int:
-    """Move the voltages towards the solved ones; returns the bits of the lanes that settled."""
-    v_pu, history = wide.winding_v_pu, wide.history
+def update_magnitudes(tree: Tree, wide: Wide, bits: int, passes: int, tolerance_pu: float) -> int:
+    """Move the voltages towards the solved ones; returns the bits of the lanes that settled.
+
+    Those of ``bits`` have, and stay where they are: another step would be one of rounding.
+    """
+    v_pu, history, done = wide.winding_v_pu, wide.history, mask_of(bits)
     largest, change, along, across, assumed, solved = find_gaps(tree, wide)
     back = splat(0.0)
     if 1 < passes <= SECANT_PASSES:
@@ -41,7 +44,8 @@ def update_magnitudes(tree: Tree, wide: Wide, passes: int, tolerance_pu: float) 
     for n in range(v_pu.shape[0]):
         value, gap = load_real(v_pu, (n, 0)), load_real(history, (2, n, 0))
         moved = value - load_real(history, (0, n, 0)) + gap - load_real(history, (1, n, 0))
-        store_real(v_pu, (n, 0), larger(value + step * gap - back * moved, splat(0.0)))
+        new = larger(value + step * gap - back * moved, splat(0.0))
+        store_real(v_pu, (n, 0), select(done, value, new))
         store_real(history, (0, n, 0), value)
         store_real(history, (1, n, 0), gap)
     error = change / larger(largest, splat(1.0))

@@ -85,7 +85,7 @@ def solve_wide(
             if found:
                 see_magnitudes(tree, wide, found)
             if (settled | found) != ALL:
-                more = update_magnitudes(tree, wide, passes, tolerance_pu)
+                more = update_magnitudes(tree, wide, settled | found, passes, tolerance_pu)
                 found |= more & ~settled
             if passes == most_passes:
                 for lane in range(WIDTH):
@@ -244,14 +244,17 @@ def write(wide: Wide, answer: Answer) -> None:
         s = scenario[lane]
         answer.flags[s], answer.passes[s] = wide.flags[lane], wide.passes[lane]
         for m in range(seen.shape[0]):
-            answer.machine_v1_v[m, s] = complex(seen[m, 0, lane], seen[m, 1, lane])
+            answer.machine_v1_v[m, s] = complex(seen[m, 0, lane] + 0.0, seen[m, 1, lane] + 0.0)
 
 
 @compiled
 def write_phasors(stack: Stack, scenario: Int, out: Complex) -> None:
-    """Three phases of all lanes into (m, 3, S)."""
+    """Three phases of all lanes into (m, 3, S).
+
+    Zeros without a sign: it would tell whether neighbours had currents fed in.
+    """
     for n in range(out.shape[0]):
         for i in range(3):
             for lane in range(WIDTH):
-                value = complex(stack[n, 2 * i, lane], stack[n, 2 * i + 1, lane])
+                value = complex(stack[n, 2 * i, lane] + 0.0, stack[n, 2 * i + 1, lane] + 0.0)
                 out[n, i, scenario[lane]] = value
