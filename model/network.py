@@ -96,7 +96,7 @@ class Network:
         nodes = np.empty(tree.load_unit.size, np.int64)
         behind = tree.load_unit >= 0
         nodes[behind] = tree.unit_node[tree.load_unit[behind]]
-        nodes[tree.branch_load] = tree.branch_node
+        nodes[tree.branch_load] = np.repeat(tree.branch_node, np.diff(tree.branch_first))
         return nodes
 
     def node(self, name: str) -> int:

@@ -20,7 +20,7 @@ from .states import Answer, Probes, State, workspace
 
 __all__ = ["FLOOR_PU", "all_probes", "new_answer", "quiet_state", "solve", "steady_state"]
 
-TOLERANCE_PU = 1e-12  #: largest change of a winding voltage in the last pass
+TOLERANCE_PU = 1e-12  #: error of a winding voltage
 MOST_PASSES = 300
 
 
@@ -82,7 +82,7 @@ def new_answer(
     start: NDArray[np.float64] | None = None,
 ) -> Answer:
     """An empty answer whose fixed point starts from nominal voltages, or from these (N, S)."""
-    windings = 4 * (len(network.units) + 1) + network.tree.branch_load.size
+    windings = 4 * (len(network.units) + 1) + network.tree.branch_node.size
     return Answer(
         v=np.empty((probes.v_node.size, 3, scenarios), np.complex128),
         i=np.empty((probes.i_edge.size, 3, scenarios), np.complex128),
@@ -92,6 +92,11 @@ def new_answer(
         flags=np.zeros(scenarios, np.int64),
         passes=np.zeros(scenarios, np.int64),
     )
+
+
+def _ordinary(values: NDArray[Any]) -> NDArray[Any]:
+    """The array, or a copy that is one piece and may be written: others are compiled anew."""
+    return np.require(values, requirements=["C", "W"])
 
 
 def _started(
@@ -123,7 +128,7 @@ def solve(
         Winding and branch voltages in pu from which the loads' fixed point starts, such as
         ``winding_v_pu`` of the state before the event; by default nominal.
     tolerance_pu : float
-        Largest change of a winding voltage in the last pass.
+        Error of a winding voltage, as the last two passes show it.
 
     Returns
     -------
@@ -140,14 +145,14 @@ def solve(
     if np.any(network.tree.passed[probes.v_node] >= 0):
         raise ValueError("probes look at a node that a leap passes by")
     scenarios, tree = state.emf_pu.size, network.tree
+    state = State._make(map(_ordinary, state))
+    probes = Probes._make(map(_ordinary, probes))
     limits = tolerance_pu, MOST_PASSES, FLOOR_PU
     if tree.tail.size:
         answer = new_answer(network, probes, scenarios, start)
         solve_block(tree, state, probes, workspace(tree), answer, *limits)
         return answer
     answer = new_answer(network, probes, scenarios, start)
-    whole = np.ascontiguousarray
-    state = state._replace(load_scale=whole(state.load_scale), exponent=whole(state.exponent))
     order = np.lexsort((state.far_node, state.edge))
     solve_wide(
         tree, state, probes, wide_workspace(tree, probes), workspace(tree), answer, order, *limits

@@ -87,7 +87,8 @@ class Tree(NamedTuple):
     load_y_s: Complex  #: (L,) per winding or branch at nominal voltage
     law: Real  #: (L, 14) what `laws.law_rows` makes of the file's voltage dependence
     law_linear: NDArray[np.bool_]  #: (L,) which is none at all
-    branch_load: Int  #: (P,)
+    branch_first: Int  #: (P + 1,) a branch has the loads ``branch_load[first[p]:first[p + 1]]``
+    branch_load: Int  #: a branch is all that lies across the same voltage
     branch_node: Int  #: (P,)
     branch_from: Int  #: (P,) phase
     branch_to: Int  #: (P,) phase, -1: earth
@@ -177,7 +178,6 @@ class Work(NamedTuple):
     v: Complex  #: (B + 1, 3); the last row is the EMF
     g: Complex  #: (U, 3, 3) winding voltage per bus voltage
     g_j: Complex  #: (U, 3)
-    branch_y: Complex  #: (P,) as last eliminated
     unit_y: Complex  #: (U, 3, 3) across the LV windings
     unit_j: Complex  #: (U, 3) fed in there
     event_y: Complex  #: (2, 3, 3) shunts at p and q
@@ -220,7 +220,6 @@ def workspace(tree: Tree) -> Work:
         v=zeros(nodes + 1, 3),
         g=zeros(units, 3, 3),
         g_j=zeros(units, 3),
-        branch_y=zeros(tree.branch_node.size),
         unit_y=zeros(units, 3, 3),
         unit_j=zeros(units, 3),
         event_y=zeros(2, 3, 3),

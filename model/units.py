@@ -111,11 +111,14 @@ def connection_of(unit: Unit, assumed: str) -> int:
 def loads_of(
     feeder: Feeder, units: list[Unit], unit_v: NDArray[np.float64], nodes: Nodes
 ) -> dict[str, Any]:
-    """The unit of every load, -1 where it has branches, these, and its nominal admittances."""
+    """The unit of every load, -1 where it has branches, these, and its nominal admittances.
+
+    Loads between the same phases of a node, with the same nominal voltage, share a branch.
+    """
     row = {id(unit): n for n, unit in enumerate(units)}
     by_name = {unit.name: n for n, unit in enumerate(units) if isinstance(unit, Transformer)}
     unit_of, y = [], []
-    branches: list[tuple[int, int, int, int, float]] = []
+    branches: dict[tuple[int, int, int, float], list[int]] = {}
     for n, load in enumerate(feeder.loads):
         unit = row.get(id(load), -1) if load.transformer is None else by_name[load.transformer]
         unit_of.append(unit)
@@ -125,17 +128,20 @@ def loads_of(
         assert load.place is not None
         node = nodes.row[node_name(feeder, load.place)]
         pairs, volts = branches_of(load, float(nodes.volts[node]))
-        branches += [(n, node, i, j, volts) for i, j in pairs]
+        for i, j in pairs:
+            branches.setdefault((node, i, j, volts), []).append(n)
         y.append(load_va(load).conjugate() / len(pairs) / volts**2)
-    columns = list(zip(*branches, strict=True)) or [()] * 5
+    columns = list(zip(*branches, strict=True)) or [()] * 4
+    counts = [len(loads) for loads in branches.values()]
     return {
         "load_unit": np.array(unit_of, np.int64),
         "load_y_s": np.array(y, np.complex128),
-        "branch_load": np.array(columns[0], np.int64),
-        "branch_node": np.array(columns[1], np.int64),
-        "branch_from": np.array(columns[2], np.int64),
-        "branch_to": np.array(columns[3], np.int64),
-        "branch_v": np.array(columns[4], np.float64),
+        "branch_first": np.cumsum([0, *counts], dtype=np.int64),
+        "branch_load": np.array([n for loads in branches.values() for n in loads], np.int64),
+        "branch_node": np.array(columns[0], np.int64),
+        "branch_from": np.array(columns[1], np.int64),
+        "branch_to": np.array(columns[2], np.int64),
+        "branch_v": np.array(columns[3], np.float64),
     }
 
 

@@ -57,18 +57,13 @@ def set_admittances(tree: Tree, state: State, work: Work, s: int, floor_pu: floa
 @compiled
 def add_branches(tree: Tree, state: State, work: Work, s: int, floor_pu: float) -> None:
     """The branches of loads that stand on a bus themselves."""
-    node, first, other, of_load = (
-        tree.branch_node,
-        tree.branch_from,
-        tree.branch_to,
-        tree.branch_load,
-    )
-    eliminated = work.branch_y
+    node, loads = tree.branch_node, tree.branch_load
     y, winding_v_pu, at = work.y, work.winding_v_pu, 4 * (tree.unit_node.size + 1)
     for p in range(node.size):
-        k, i, j = node[p], first[p], other[p]
-        own = load_admittance(tree, state, of_load[p], s, winding_v_pu[at + p], floor_pu)
-        eliminated[p] = own
+        k, i, j = node[p], tree.branch_from[p], tree.branch_to[p]
+        own = 0j
+        for n in range(tree.branch_first[p], tree.branch_first[p + 1]):
+            own += load_admittance(tree, state, loads[n], s, winding_v_pu[at + p], floor_pu)
         y[k, i, i] += own
         if j >= 0:
             y[k, j, j] += own

@@ -150,7 +150,8 @@ def _own_branches(case: Case, load: int) -> list[int]:
     if case.feeder.loads[load].connection == "delta":
         around = zip(phases, [*phases[1:], phases[0]], strict=True)
         pairs = [{a, b} for a, b in around][: 1 if len(phases) == 2 else 3]
-    own = np.flatnonzero(tree.branch_load == load)
+    branch_of = np.repeat(np.arange(tree.branch_node.size), np.diff(tree.branch_first))
+    own = branch_of[tree.branch_load == load]
     return [next(int(k) for k in own if ends[k] == pair) for pair in pairs]
 
 

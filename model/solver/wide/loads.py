@@ -9,7 +9,7 @@ from ..assemble import Real
 from .powers import power
 from .work import ALL, Wide
 
-__all__ = ["load_admittance"]
+__all__ = ["branch_admittance", "load_admittance"]
 
 
 @compiled
@@ -34,6 +34,24 @@ def load_admittance(tree: Tree, wide: Wide, n: int, v_pu: float, floor_pu: float
     own = exponent < 0.0
     real, imag = select(own, real, factor), select(own, imag, factor)
     return joined(nominal.real * real, nominal.imag * imag)
+
+
+@compiled
+def branch_admittance(tree: Tree, wide: Wide, p: int, v_pu: float, floor_pu: float) -> complex:
+    """Admittances of all loads of branch p; those of one exponent take its power once."""
+    total = joined(splat(0.0), splat(0.0))
+    held, last, factor = larger(v_pu, splat(floor_pu)), splat(2.0), splat(1.0)
+    for at in range(tree.branch_first[p], tree.branch_first[p + 1]):
+        n = tree.branch_load[at]
+        exponent = load_real(wide.exponent, (n, 0))
+        if bits_of(exponent < 0.0) != 0:
+            total = total + load_admittance(tree, wide, n, v_pu, floor_pu)
+            continue
+        if bits_of(exponent == last) != ALL:
+            factor, last = power(held, exponent - 2.0), exponent
+        nominal = load_real(wide.load_scale, (n, 0)) * complex(tree.load_y_s[n])
+        total = total + nominal * factor
+    return total
 
 
 @compiled_apart

@@ -11,7 +11,7 @@ from ..bank import D_YG, YG_D, YG_YG
 from ..bank_forms import delta_wye, wye_delta, wye_wye
 from ..breaks import squared
 from ..matrix3 import ZERO, Matrix, load, store, store_vector, times
-from .loads import load_admittance
+from .loads import branch_admittance, load_admittance
 from .rows import (
     add_in_lane,
     add_matrix,
@@ -46,8 +46,7 @@ def find_demand(tree: Tree, wide: Wide, floor_pu: float) -> int:
     near = select(broken, NEAR_BROKEN**2, splat(NEAR**2))
     demand = mask_of(0)
     for p in range(tree.branch_node.size):
-        n = tree.branch_load[p]
-        own = load_admittance(tree, wide, n, load_real(v_pu, (at + p, 0)), floor_pu)
+        own = branch_admittance(tree, wide, p, load_real(v_pu, (at + p, 0)), floor_pu)
         store_entry(own_y, p, 0, own)
         past = load_entry(eliminated, p, 0)
         demand = demand | (squared(own - past) > near * squared(past))
@@ -212,6 +211,8 @@ def set_region_shunts(tree: Tree, state: State, wide: Wide, full: bool) -> None:
         far, s = wide.far[lane], wide.scenario[lane]
         if far >= 0 and (full or tree.passed[far] >= 0):
             for i in range(3):
+                if not tree.node_phases[far] >> i & 1:
+                    continue
                 following = (i + 1) % 3
                 earth, between = state.far_y_s[i, s], state.far_between_y_s[i, s]
                 add_in_lane(wide.y, far, 4 * i, lane, earth + between)
