@@ -20,7 +20,7 @@ from .states import Answer, Probes, State, workspace
 
 __all__ = ["FLOOR_PU", "all_probes", "new_answer", "quiet_state", "solve", "steady_state"]
 
-TOLERANCE_PU = 1e-12  #: error of a winding voltage
+TOLERANCE_PU = 1e-12  #: estimated error of a winding voltage
 MOST_PASSES = 300
 
 
@@ -128,7 +128,7 @@ def solve(
         Winding and branch voltages in pu from which the loads' fixed point starts, such as
         ``winding_v_pu`` of the state before the event; by default nominal.
     tolerance_pu : float
-        Error of a winding voltage, as the last two passes show it.
+        Error of a winding voltage as the passes show it: an estimate, not a bound.
 
     Returns
     -------

@@ -24,7 +24,7 @@ from .draw_event import event_sides
 __all__ = ["BLOCK", "TOLERANCE_PU", "Observed", "bounds_of", "observe"]
 
 BLOCK = 2000  #: scenarios a block; part of every random stream, so never a matter of jobs
-TOLERANCE_PU = 2e-6  #: error of a voltage; the instruments add 1.3e-4
+TOLERANCE_PU = 2e-6  #: estimated error of a voltage; the instruments add 1.3e-4
 
 Int = NDArray[np.int64]
 
