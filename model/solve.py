@@ -148,11 +148,10 @@ def solve(
     state = State._make(map(_ordinary, state))
     probes = Probes._make(map(_ordinary, probes))
     limits = tolerance_pu, MOST_PASSES, FLOOR_PU
+    answer = new_answer(network, probes, scenarios, start)
     if tree.tail.size:
-        answer = new_answer(network, probes, scenarios, start)
         solve_block(tree, state, probes, workspace(tree), answer, *limits)
         return answer
-    answer = new_answer(network, probes, scenarios, start)
     order = np.lexsort((state.far_node, state.edge))
     solve_wide(
         tree, state, probes, wide_workspace(tree, probes), workspace(tree), answer, order, *limits

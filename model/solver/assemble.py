@@ -13,13 +13,7 @@ from ..states import State, Tree, Work
 from .bank import YG_D, bank, plain_bank
 from .matrix3 import ZERO, add, load, load_vector, plus, scaled, store, store_vector
 
-__all__ = [
-    "add_machine",
-    "add_shunt",
-    "hang_bank",
-    "set_admittances",
-    "set_event_shunts",
-]
+__all__ = ["add_machine", "hang_bank", "set_admittances"]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -58,14 +58,7 @@ from .series import carry_current, per_fork, up
 from .settle import is_linear, positive, see_magnitudes, update_magnitudes
 from .turns import turn_edge
 
-__all__ = [
-    "climb_edge",
-    "descend_edge",
-    "edge_current",
-    "is_sourced",
-    "neutral_shift",
-    "solve_block",
-]
+__all__ = ["is_sourced", "solve_block"]
 
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]

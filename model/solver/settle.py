@@ -27,10 +27,9 @@ def update_magnitudes(tree: Tree, state: State, work: Work, s: int, passes: int)
     The largest gap between assumed and solved, in pu of the largest voltage where that exceeds
     nominal, bounds the error of what was assumed. The solved ones move by only part of what the
     assumed ones do, at most as much as two passes have shown, and their error is smaller by that.
-    From the second
-    pass on the step follows the secant through this pass and the last (Anderson's mixing of depth
-    one), which also ends cycles and creeping near collapse; what wanders all the same settles
-    in plain steps.
+    From the second pass on the step follows the secant through this pass and the last (Anderson's
+    mixing of depth one), which also ends cycles and creeping near collapse; what wanders all the
+    same settles in plain steps.
     """
     v_pu, history = work.winding_v_pu, work.history
     largest = max(1.0, find_gaps(tree, state, work, s))

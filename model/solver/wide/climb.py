@@ -23,6 +23,7 @@ from ..series import up
 from ..turns import transposed
 from .event import climb_event, event_lanes, event_share, free_modes
 from .rows import (
+    add_entry,
     add_matrix,
     add_vector,
     chosen,
@@ -31,11 +32,12 @@ from .rows import (
     load_entry,
     load_matrix,
     load_triple,
+    no_vector,
     store_entry,
     store_matrix,
     store_triple,
 )
-from .turns import turn_of, turned
+from .turns import turn_edge, turn_of, turned
 from .work import ALL, PASSED, TWIG, Wide
 
 __all__ = ["climb", "mark_regions"]
@@ -70,7 +72,7 @@ def climb(tree: Tree, wide: Wide, full: bool, fed: bool, floor_pu: float) -> Non
             if full:
                 put_matrix(wide, k, in_lanes(load(tree.leap_chain[wide.leap[k]], 2)))
             if fed and wide.busy[k]:
-                store_triple(wide.x_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
+                store_triple(wide.x_j, k, no_vector())
         elif a >= 0:
             if full:
                 put_entry(wide, k, a, climb_lone(tree, wide, k, a))
@@ -95,12 +97,12 @@ def climb_region(tree: Tree, wide: Wide, k: int, full: bool, fed: bool, floor_pu
     q, above, own = wide.leap[k], wide.above[k], mask_of(wide.busy[k])
     store_matrix(wide.top, 0, in_lanes(ZERO))
     store_matrix(wide.top, 1, in_lanes(ZERO))
-    store_triple(wide.top_j, 0, times(in_lanes(ZERO), (0j, 0j, 0j)))
+    store_triple(wide.top_j, 0, no_vector())
     first, last = (0, 1) if q < 0 else (tree.region_from[q], tree.region_from[q + 1])
     for at in range(first, last):
         n = k if q < 0 else tree.region_node[at]
         bits, parent = event_lanes(wide, n), tree.parent[n]
-        drawn = times(in_lanes(ZERO), (0j, 0j, 0j))
+        drawn = no_vector()
         if fed:
             drawn = load_triple(wide.y_j, n)
         w, drawn = climb_event(tree, wide, n, bits, drawn, floor_pu)
@@ -169,18 +171,18 @@ def put_entry(wide: Wide, k: int, a: int, w: complex) -> None:
         store_entry(wide.w, k, 4 * a, w)
     else:
         above = wide.above[k]
-        store_entry(wide.y, above, 4 * a, load_entry(wide.y, above, 4 * a) + w)
+        add_entry(wide.y, above, 4 * a, w)
 
 
 @compiled
 def put_drawn_entry(wide: Wide, k: int, a: int, drawn: complex) -> None:
     """X of an edge with a single phase, likewise."""
     if is_watched(wide, k):
-        store_triple(wide.x_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
+        store_triple(wide.x_j, k, no_vector())
         store_entry(wide.x_j, k, a, drawn)
     else:
         above = wide.above[k]
-        store_entry(wide.y_j, above, a, load_entry(wide.y_j, above, a) + drawn)
+        add_entry(wide.y_j, above, a, drawn)
 
 
 @compiled
@@ -265,7 +267,7 @@ def seen_through(tree: Tree, wide: Wide, k: int, drawn: Vector) -> Vector:
 def climb_loose(tree: Tree, wide: Wide, k: int, fed: bool) -> None:
     """Past an edge that leaves modes loose at its lower end."""
     if not fed:
-        store_triple(wide.y_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
+        store_triple(wide.y_j, k, no_vector())
     below = load_matrix(wide.y, k), load_triple(wide.y_j, k)
     w, p, x, h = free_modes(tree, wide, k, below, ALL)
     z = load(tree.z_ohm, k)
@@ -274,9 +276,7 @@ def climb_loose(tree: Tree, wide: Wide, k: int, fed: bool) -> None:
     x, h = plus(x, times(w, more)), plus(h, times(p, more))
     f = product(p, f)
     if turned(tree, k):
-        t = turn_of(tree, wide, k)
-        back = transposed(t)
-        f, seen, x = product(f, t), product(back, product(seen, t)), times(back, x)
+        f, seen, x = turn_edge(tree, wide, k, (f, seen, x))
     store_matrix(wide.f, k, f)
     store_matrix(wide.w, k, seen)
     store_triple(wide.h_j, k, h)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from ...compiled import compiled
-from ...lanes.functions import bits_of, joined, larger, mask_of, select, splat
+from ...lanes.functions import bits_of, joined, mask_of, select, splat
 from ...states import Tree
-from ..breaks import FLOATING, NOTHING_S, SINGULAR, squared
+from ..breaks import FLOATING, squared
 from ..matrix3 import (
-    ZERO,
     Vector,
     column_sums,
     load,
@@ -17,14 +16,14 @@ from ..matrix3 import (
     scaled,
     times,
 )
-from .event import descend_event, event_lanes, event_share, note
+from .event import descend_event, event_lanes, event_share, note, smallest_counted
 from .rows import (
     Stack,
     chosen_vector,
-    in_lanes,
     load_entry,
     load_matrix,
     load_triple,
+    no_vector,
     store_entry,
     store_triple,
 )
@@ -44,10 +43,7 @@ def lift_neutrals(tree: Tree, wide: Wide, fed: bool) -> None:
         drawn = plus(drawn, load_triple(wide.x_j, 0))
     sums = column_sums(w)
     total = sums[0] + sums[1] + sums[2] + tree.neutral_y_s
-    limit = splat(NOTHING_S**2)
-    for i in range(9):
-        limit = larger(limit, SINGULAR**2 * squared(load_entry(wide.w, 0, i)))
-    free = squared(total) <= limit
+    free = squared(total) <= smallest_counted(wide.w)
     note(wide, bits_of(free), FLOATING)
     shift = -(drawn[0] + drawn[1] + drawn[2]) * reciprocal(select(free, 1 + 0j, total))
     shift = select(free, 0j, shift)
@@ -137,7 +133,7 @@ def keep_stubs(wide: Wide, bits: int, phases: int) -> None:
 def probe_current(tree: Tree, wide: Wide, k: int, below: bool, fed: bool) -> Vector:
     """Current from above into an edge, or out of its lower end."""
     v_all, upper, bits = wide.v, wide.above[k], event_lanes(wide, k)
-    own, nothing = mask_of(bits), times(in_lanes(ZERO), (0j, 0j, 0j))
+    own, nothing = mask_of(bits), no_vector()
     if below and turned(tree, k):
         current = times(load_matrix(wide.y, k), load_triple(v_all, k))
         if fed:

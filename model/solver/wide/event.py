@@ -30,6 +30,7 @@ from ..series import up
 from ..turns import transposed
 from .powers import power
 from .rows import (
+    Stack,
     add_entry,
     chosen,
     chosen_vector,
@@ -37,16 +38,24 @@ from .rows import (
     load_entry,
     load_matrix,
     load_triple,
+    no_vector,
     store_entry,
     store_matrix,
     store_triple,
 )
-from .turns import turn_of, turned
+from .turns import turn_edge, turned
 from .work import Wide
 
-__all__ = ["climb_event", "descend_event", "event_lanes", "event_share", "free_modes", "note"]
+__all__ = [
+    "climb_event",
+    "descend_event",
+    "event_lanes",
+    "event_share",
+    "free_modes",
+    "note",
+    "smallest_counted",
+]
 
-NOTHING: Vector = (0j, 0j, 0j)
 Modes = tuple[Matrix, Matrix, Vector, Vector]  #: W, P, x, h
 
 
@@ -79,7 +88,7 @@ def climb_event(
     if tree.charged:
         part = event_share(wide, bits, 0.0)
         y = add(y, scaled(load(tree.end_y_s, n), -part))
-    p, h = in_lanes(IDENTITY), times(in_lanes(ZERO), NOTHING)
+    p, h = in_lanes(IDENTITY), no_vector()
     if wide.loose[n]:
         y, p, drawn, h = free_modes(tree, wide, n, (y, drawn), bits)
     low = scaled(z, 1.0 - share)
@@ -102,9 +111,7 @@ def climb_event(
     ahead = minus(times(f, times(high, drawn)))
     drawn = plus(drawn, times(w, ahead))
     if turned(tree, n):
-        t = turn_of(tree, wide, n)
-        back = transposed(t)
-        f, seen, drawn = product(f, t), product(back, product(seen, t)), times(back, drawn)
+        f, seen, drawn = turn_edge(tree, wide, n, (f, seen, drawn))
     store_matrix(wide.own_f, n, f)
     store_triple(wide.own_h, n, ahead)
     return seen, drawn
@@ -141,11 +148,11 @@ def event_shunts(
 
 
 @compiled
-def smallest_counted(wide: Wide) -> float:
-    """The square of what counts as no admittance beside W."""
+def smallest_counted(stack: Stack) -> float:
+    """The square of what counts as no admittance beside W, the first matrix of ``stack``."""
     largest = splat(0.0)
     for i in range(9):
-        largest = larger(largest, squared(load_entry(wide.here, 0, i)))
+        largest = larger(largest, squared(load_entry(stack, 0, i)))
     return larger(SINGULAR**2 * largest, splat(NOTHING_S**2))
 
 
@@ -154,11 +161,11 @@ def open_phases(wide: Wide, bits: int) -> None:
     """Open the phases of the lanes in ``bits``: W, x in ``here`` change, P and h come beside."""
     here, here_j = wide.here, wide.here_j
     store_matrix(here, 1, in_lanes(IDENTITY))
-    store_triple(here_j, 1, times(in_lanes(ZERO), NOTHING))
+    store_triple(here_j, 1, no_vector())
     opened = (wide.opened[0] & bits, wide.opened[1] & bits, wide.opened[2] & bits)
     if not opened[0] | opened[1] | opened[2]:
         return
-    limit = smallest_counted(wide)
+    limit = smallest_counted(wide.here)
     empty = bits
     whole = opened[0] & opened[1] & opened[2]
     if whole:
@@ -229,8 +236,8 @@ def free_modes(tree: Tree, wide: Wide, n: int, below: tuple[Matrix, Vector], bit
     """Let loose the modes of edge n, as ``breaks.free_modes``; flags in the lanes of ``bits``."""
     w, x = below
     store_matrix(wide.here, 0, w)
-    limit = smallest_counted(wide)
-    p, h = in_lanes(IDENTITY), times(in_lanes(ZERO), NOTHING)
+    limit = smallest_counted(wide.here)
+    p, h = in_lanes(IDENTITY), no_vector()
     for m in range(tree.loose_from[n], tree.loose_from[n + 1]):
         e = (tree.loose[m, 0], tree.loose[m, 1], tree.loose[m, 2])
         down, own, ahead = times(w, e), times(transposed(w), e), times(p, e)

@@ -21,6 +21,7 @@ __all__ = [
     "load_entry",
     "load_matrix",
     "load_triple",
+    "no_vector",
     "put_in_lane",
     "store_entry",
     "store_matrix",
@@ -150,6 +151,13 @@ def in_lanes(m: Matrix) -> Matrix:
         one * m[7],
         one * m[8],
     )
+
+
+@compiled
+def no_vector() -> Vector:
+    """Zero in every lane."""
+    zero = joined(splat(0.0), splat(0.0))
+    return (zero, zero, zero)
 
 
 @compiled

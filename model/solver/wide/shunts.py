@@ -10,9 +10,10 @@ from ..assemble import add_machine, hang_bank
 from ..bank import D_YG, YG_D, YG_YG
 from ..bank_forms import delta_wye, wye_delta, wye_wye
 from ..breaks import squared
-from ..matrix3 import ZERO, Matrix, load, store, store_vector, times
+from ..matrix3 import ZERO, Matrix, load, store, store_vector
 from .loads import branch_admittance, load_admittance
 from .rows import (
+    add_entry,
     add_in_lane,
     add_matrix,
     chosen,
@@ -20,6 +21,7 @@ from .rows import (
     load_entry,
     load_matrix,
     load_triple,
+    no_vector,
     put_in_lane,
     store_entry,
     store_matrix,
@@ -93,19 +95,19 @@ def set_shunts(
         taken = select(renewed, own, taken)
         if full:
             store_entry(wide.branch_y, p, 0, taken)
-            store_entry(y, k, 4 * i, load_entry(y, k, 4 * i) + taken)
+            add_entry(y, k, 4 * i, taken)
             if j >= 0:
-                store_entry(y, k, 4 * j, load_entry(y, k, 4 * j) + taken)
-                store_entry(y, k, 3 * i + j, load_entry(y, k, 3 * i + j) - taken)
-                store_entry(y, k, 3 * j + i, load_entry(y, k, 3 * j + i) - taken)
+                add_entry(y, k, 4 * j, taken)
+                add_entry(y, k, 3 * i + j, -taken)
+                add_entry(y, k, 3 * j + i, -taken)
         if demand != ALL:
             across = load_entry(v, k, i)
             if j >= 0:
                 across = across - load_entry(v, k, j)
             current = (own - taken) * across
-            store_entry(y_j, k, i, load_entry(y_j, k, i) + current)
+            add_entry(y_j, k, i, current)
             if j >= 0:
-                store_entry(y_j, k, j, load_entry(y_j, k, j) - current)
+                add_entry(y_j, k, j, -current)
 
 
 @compiled
@@ -124,7 +126,7 @@ def hang_units(tree: Tree, state: State, wide: Wide, work: Work, floor_pu: float
             for i in range(3):
                 seen = load_real(v_pu, (4 * unit + i, 0))
                 own = load_admittance(tree, wide, n, seen, floor_pu)
-                store_entry(unit_y, unit, i, load_entry(unit_y, unit, i) + own)
+                add_entry(unit_y, unit, i, own)
     apart = 0
     for unit in range(units):
         rare = ALL
@@ -231,4 +233,4 @@ def empty_leap(tree: Tree, wide: Wide, node: int) -> None:
         k = tree.region_node[n]
         if tree.passed[k] >= 0:
             store_matrix(wide.y, k, in_lanes(load(tree.shunt_s, k)))
-            store_triple(wide.y_j, k, times(in_lanes(ZERO), (0j, 0j, 0j)))
+            store_triple(wide.y_j, k, no_vector())

@@ -10,17 +10,17 @@ from ...lanes.functions import bits_of, load_real, mask_of, select, splat, store
 from ...lanes.kinds import WIDTH
 from ...states import NOT_CONVERGED, Answer, Probes, State, Tree, Work
 from ..ladder import is_sourced
-from ..matrix3 import ZERO, Vector, plus, times
+from ..matrix3 import Vector, plus, times
 from ..settle import LEAST_SHARE, is_steady, positive
 from .climb import climb, mark_regions
 from .descend import descend, lift_neutrals, probe_current
 from .rows import (
     Stack,
     chosen_vector,
-    in_lanes,
     load_entry,
     load_matrix,
     load_triple,
+    no_vector,
     put_in_lane,
     store_entry,
     store_triple,
@@ -128,7 +128,7 @@ def begin(tree: Tree, state: State, wide: Wide, answer: Answer, chosen: Int) -> 
             anew |= 1 << lane
         place_event(state, wide, lane, s)
     for side in range(2):
-        store_triple(wide.stub, side, times(in_lanes(ZERO), (0j, 0j, 0j)))
+        store_triple(wide.stub, side, no_vector())
     return linear, anew
 
 

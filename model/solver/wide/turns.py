@@ -5,11 +5,14 @@ from __future__ import annotations
 from ...compiled import compiled
 from ...lanes.functions import load_real
 from ...states import Tree
-from ..matrix3 import IDENTITY, Matrix, load
+from ..matrix3 import IDENTITY, Matrix, Vector, load, product, times
+from ..turns import transposed
 from .rows import add_entry, in_lanes, load_matrix, store_matrix
 from .work import Wide
 
-__all__ = ["turn_of", "turned"]
+__all__ = ["turn_edge", "turn_of", "turned"]
+
+Row = tuple[Matrix, Matrix, Vector]  #: F, W and x of an edge
 
 
 @compiled
@@ -32,3 +35,11 @@ def turn_of(tree: Tree, wide: Wide, k: int) -> Matrix:
         if reference[row, i] >= 0:
             add_entry(t, 0, 3 * i + reference[row, i], -more)
     return load_matrix(t, 0)
+
+
+@compiled
+def turn_edge(tree: Tree, wide: Wide, k: int, below: Row) -> Row:
+    """Put what stands at the upper end of edge k above the rest of it."""
+    t = turn_of(tree, wide, k)
+    f, w, x = below
+    return product(f, t), product(transposed(t), product(w, t)), times(transposed(t), x)

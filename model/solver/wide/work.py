@@ -13,7 +13,7 @@ from ...lanes.kinds import WIDTH
 from ...states import Probes, Tree
 from .rows import Stack
 
-__all__ = ["ALL", "LEAP", "PASSED", "PLAIN", "TWIG", "Wide", "wide_workspace"]
+__all__ = ["ALL", "PASSED", "TWIG", "Wide", "wide_workspace"]
 
 Int = NDArray[np.int64]
 Real = NDArray[np.float64]
@@ -29,8 +29,8 @@ class Wide(NamedTuple):
 
     What each means stands at the field of that name in ``Work``. ``visit`` says whether a node is
     passed by, and ``leap`` which leap ends there or, for a twig, begins; a region is what the
-    ladder takes apart for a scenario by itself: an edge on which something happens with the
-    whole leap that it is part of, or one that leaves modes loose.
+    ladder takes apart for a scenario by itself: an edge on which something happens, with the
+    whole leap that it is part of.
     """
 
     visit: Int  #: (B,)
@@ -125,7 +125,7 @@ def _made(tree: Tree, probes: Probes) -> Wide:
     return Wide(
         *_visits(tree),
         loose=loose,
-        watched=_watched(tree, probes, loose),
+        watched=_watched(probes, loose),
         notes=notes,
         reciprocal=np.array([reciprocal]),
         branch_over=1.0 / tree.branch_v,
@@ -201,7 +201,7 @@ def _visits(tree: Tree) -> tuple[Int, Int, Int, Int]:
     return visit, leap, above, place
 
 
-def _watched(tree: Tree, probes: Probes, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _watched(probes: Probes, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Edges at probes, that of the source, and those that leave modes loose."""
     watched = loose.copy()
     watched[0] = True
